@@ -227,25 +227,9 @@ impl Prepared<'_> {
     fn draw(&self, mut times: Times, profile: &mut Profile, so_far: &mut SoFar) -> Exit {
         let Task { job, messages, progress, batch } = *self.task;
         let Self { shot, effective, loaded, work, .. } = self;
-        so_far.shown = so_far.shown || self.is_frame && unseen::shows_something(work);
-        if !self.is_frame
-            && let Some(warning) = unseen::warning(work, (&shot.choice, self.phrase), job.look.lens, self.task.file())
-        {
-            // All around a model it is the same.
-            if so_far.unseen.insert((self.task.file().to_owned(), shot.choice.name())) {
-                messages.say(Severity::Warning, &warning);
-            }
-            if job.strict {
-                return self.refuse_warned();
-            }
-        }
-        if shot.kind == FileKind::Jpeg && work.scene.background == Some(Background::Transparent) {
-            let text = "JPEG has no transparency: what is transparent is white";
-            let warning = Diagnostic::new("jpeg-opaque", shot.target.path().unwrap_or(Path::new("-")), "", text);
-            messages.say(Severity::Warning, &warning.remedy("write PNG or WebP"));
-            if job.strict {
-                return self.refuse_warned();
-            }
+        let is_warned = self.warn(so_far);
+        if is_warned && job.strict {
+            return self.refuse_warned();
         }
         profile.skip();
         // Until the picture is written the first signal ends no more than its rays.
@@ -290,6 +274,30 @@ impl Prepared<'_> {
             Ok(()) => self.judge(counted.as_ref()),
             Err(fault) => self.task.fail(&fault, Exit::Failed),
         }
+    }
+
+    /// Warns of a picture that shows nothing, or not what was asked for; whether it did.
+    fn warn(&self, so_far: &mut SoFar) -> bool {
+        let Task { job, messages, .. } = *self.task;
+        let Self { shot, work, .. } = self;
+        so_far.shown = so_far.shown || self.is_frame && unseen::shows_something(work);
+        let unseen = match self.is_frame {
+            true => None,
+            false => unseen::warning(work, (&shot.choice, self.phrase), job.look.lens, self.task.file()),
+        };
+        // All around a model it is the same.
+        if let Some(warning) = &unseen
+            && so_far.unseen.insert((self.task.file().to_owned(), shot.choice.name()))
+        {
+            messages.say(Severity::Warning, warning);
+        }
+        let is_lost = shot.kind == FileKind::Jpeg && work.scene.background == Some(Background::Transparent);
+        if is_lost && !(job.strict && unseen.is_some()) {
+            let text = "JPEG has no transparency: what is transparent is white";
+            let warning = Diagnostic::new("jpeg-opaque", shot.target.path().unwrap_or(Path::new("-")), "", text);
+            messages.say(Severity::Warning, &warning.remedy("write PNG or WebP"));
+        }
+        is_lost || unseen.is_some()
     }
 
     /// Says that there is no picture, as warnings are errors and there was one.

@@ -10,10 +10,11 @@ use super::{accident, interrupt, meter, picture};
 use crate::accel::{AccelParams, auto};
 use crate::bench::study::report::{Format, text};
 use crate::bench::study::{Plan, Study, Subject, measure, reference, settings};
-use crate::image::Output;
+use crate::image::{Output, ToneMap};
 use crate::load::Diagnostic;
 use crate::render::texture::TextureStore;
 use crate::render::{Job, Settings};
+use crate::scene::Scene;
 use crate::threads;
 use std::path::PathBuf;
 
@@ -45,35 +46,19 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
         .iter()
         .try_for_each(|path| sources.spared_by(path, "--report"))
         .map_err(|fault| messages.fail(&fault, Exit::Failed))?;
-    let hints = &loaded.scene.hints;
-    let base = Settings { seed: args.seed, ..seen::settings(args.size, None, hints) };
-    let tone_map = match hints.tone_map.as_deref().map(str::parse).transpose() {
-        Ok(hinted) => args.tone_map.or(hinted).unwrap_or_default(),
-        Err(e) => {
-            let fault = Diagnostic::new("scene-value", args.model.input.as_path(), "", e.to_string());
-            return Err(messages.fail(&fault, Exit::Input));
-        }
-    };
+    let scene = &loaded.scene;
+    let base = Settings { seed: args.seed, ..seen::settings(args.size, None, &scene.hints) };
+    let tone_map = tone_map(args, scene).map_err(|fault| messages.fail(&fault, Exit::Input))?;
     let (accel, _) = auto::build(args.accel, &world.shapes, &AccelParams::DEFAULT);
-    let textures = TextureStore::new(&loaded.scene);
-    let given = args.exposure.or(hints.exposure);
-    let metered = given.is_none().then(|| {
-        let (scene, settings) = (&loaded.scene, &base);
-        meter::exposure(&Job { scene, world: &world, accel: &accel, textures: &textures, view: &view, settings })
-    });
-    let metered = metered.flatten();
+    let textures = TextureStore::new(scene);
+    let given = args.exposure.or(scene.hints.exposure);
+    let job = Job { scene, world: &world, accel: &accel, textures: &textures, view: &view, settings: &base };
+    let metered = given.is_none().then(|| meter::exposure(&job)).flatten();
     let output = Output { tone_map, exposure: given.or(metered).unwrap_or(0.0), ..Output::default() };
-    let output = picture::before(loaded.scene.background, output);
+    let output = picture::before(scene.background, output);
     let phrase = metered.map_or(phrase.clone(), |stops| format!("{phrase}, {}", meter::phrase(stops)));
-    let subject = Subject {
-        scene: &loaded.scene,
-        world: &world,
-        accel: &accel,
-        textures: &textures,
-        view: &view,
-        base: &base,
-        output: &output,
-    };
+    let subject =
+        Subject { scene, world: &world, accel: &accel, textures: &textures, view: &view, base: &base, output: &output };
     let plan = Plan { passes: args.passes, reference_samples: args.reference_samples, seed: args.seed };
     let mut going = |done: u32, of: u32| {
         messages.info("progress", format!("{name}: the reference, part {} of {of}", done + 1));
@@ -106,6 +91,13 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
     messages.print(&text::conclusion(&study))?;
     told.write(&study)?;
     Ok(if study.complete { Exit::Done } else { Exit::Interrupted })
+}
+
+/// The curve that was asked for, or else that of the scene file.
+fn tone_map(args: &StudyArgs, scene: &Scene) -> Result<ToneMap, Diagnostic> {
+    let hinted = scene.hints.tone_map.as_deref().map(str::parse::<ToneMap>).transpose();
+    let hinted = hinted.map_err(|e| Diagnostic::new("scene-value", args.model.input.as_path(), "", e.to_string()))?;
+    Ok(args.tone_map.or(hinted).unwrap_or_default())
 }
 
 /// Where rows go as they come.

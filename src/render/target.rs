@@ -47,7 +47,43 @@ pub(super) struct Plan<P> {
     counts: Vec<ByClass<P>>,
 }
 
-impl<P> Plan<P> {
+impl<P: Observer> Plan<P> {
+    /// Nothing is known yet.
+    fn new(how: &Stochastic) -> Self {
+        Self {
+            how: Stochastic { target: None, ..*how },
+            asked: how.min_samples,
+            rmse: 0.0,
+            slope: 1.0,
+            work: 1.0,
+            rays: 0,
+            spent: 0.0,
+            cpu: 0.0,
+            counts: Vec::new(),
+        }
+    }
+
+    /// Takes in what two renderings of parts of a picture cost; the samples that a pixel of one has on average.
+    fn take(&mut self, parts: Vec<Part<P>>, settings: &Settings) -> f64 {
+        let pixels = f64::from(settings.width) * f64::from(settings.height);
+        self.cpu = parts.iter().map(|part| part.seconds_per_pixel() * pixels * 0.5).sum();
+        let samples = parts.iter().map(|part| part.samples_per_pixel() * 0.5).sum();
+        for part in parts {
+            self.rays += part.rays();
+            self.spent += part.seconds();
+            self.counts.extend(part.counts);
+        }
+        samples
+    }
+
+    /// Learns from two errors of a pixel, and those of the whole picture that they left, how these hang together.
+    fn learn(&mut self, (error, rmse): (f64, f64), (next_error, next_rmse): (f64, f64)) {
+        if next_error != error && rmse > 0.0 && next_rmse > 0.0 {
+            // Noise of the estimate must not turn the search round.
+            self.slope = (libm::log(next_rmse / rmse) / libm::log(next_error / error)).clamp(0.3, 1.5);
+        }
+    }
+
     /// Error of another rendering that, mixed with one of error `have`, makes one of error `target`; both weighed by the
     /// inverse of their squares.
     fn missing(&self, have: f64, target: f64) -> f64 {
@@ -66,7 +102,7 @@ impl<P> Plan<P> {
             self.how.min_samples = (self.how.min_samples / 2).max(self.asked / 2).max(1);
         }
         let gain = libm::pow(next / last, 1.0 / self.slope);
-        self.how.error = single((f64::from(self.how.error) * gain).clamp(1e-5, 0.5));
+        self.how.error = single((f64::from(self.how.error) * gain).clamp(*RANGE.start(), *RANGE.end()));
     }
 
     /// Those of one of its renderings.
@@ -87,23 +123,11 @@ pub(super) fn plan<P: Observer>(
     how: &Stochastic,
     progress: &dyn Progress,
 ) -> Option<Plan<P>> {
-    /// Errors of a pixel that make sense.
-    const RANGE: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
     const TRIES: usize = 6;
     let target = f64::from(how.target.unwrap_or(how.error));
     let wanted = OVER * std::f64::consts::SQRT_2 * target;
     let (squares, measure) = (squares(job.settings.width, job.settings.height), Measure::of(job));
-    let mut plan = Plan {
-        how: Stochastic { target: None, ..*how },
-        asked: how.min_samples,
-        rmse: 0.0,
-        slope: 1.0,
-        work: 1.0,
-        rays: 0,
-        spent: 0.0,
-        cpu: 0.0,
-        counts: Vec::new(),
-    };
+    let mut plan = Plan::new(how);
     let (mut error, mut before, mut most) = (3.0 * wanted, None, f64::INFINITY);
     for left in (0..TRIES).rev() {
         error = error.clamp(*RANGE.start(), *RANGE.end());
@@ -116,23 +140,9 @@ pub(super) fn plan<P: Observer>(
         let of_all = Interval::of_ratio(&squared, 1.0).map(f64::sqrt);
         // A single square has all pixels of a small picture, or nothing tells how far off it is.
         (plan.rmse, most) = (of_all.value, if of_all.high.is_finite() { of_all.high } else { of_all.value });
-        let pixels = f64::from(job.settings.width) * f64::from(job.settings.height);
-        plan.cpu = parts.iter().map(|part| part.seconds_per_pixel() * pixels * 0.5).sum();
-        let samples = parts.iter().map(|part| part.samples_per_pixel() * 0.5).sum();
-        for part in parts {
-            plan.rays += part.rays();
-            plan.spent += part.seconds();
-            plan.counts.extend(part.counts);
-        }
-        let fewest = how.min_samples.max(fewest(samples)).min(how.max_samples.max(1));
-        let found = (error, plan.rmse);
-        if let Some((error, rmse)) = before.replace(found)
-            && found.0 != error
-            && rmse > 0.0
-            && found.1 > 0.0
-        {
-            // Noise of the estimate must not turn the search round.
-            plan.slope = (libm::log(found.1 / rmse) / libm::log(found.0 / error)).clamp(0.3, 1.5);
+        let fewest = how.min_samples.max(fewest(plan.take(parts, job.settings))).min(how.max_samples.max(1));
+        if let Some(before) = before.replace((error, plan.rmse)) {
+            plan.learn(before, (error, plan.rmse));
         }
         let off = plan.rmse / wanted;
         let is_at_end = off < 1.0 && error >= *RANGE.end() || off > 1.0 && error <= *RANGE.start();
@@ -153,6 +163,9 @@ pub(super) fn plan<P: Observer>(
     };
     Some(plan)
 }
+
+/// Errors of a pixel that make sense.
+const RANGE: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
 
 /// What pixels should start with, a power of two, when they get so many samples on average: those that see nothing in their
 /// first ones stop, and where many samples are wanted that is an error which more renderings do not lessen.

@@ -13,7 +13,7 @@ use super::{accident, interrupt};
 use crate::accel::{AccelKind, AccelParams};
 use crate::bench::compare::{Plan, compare};
 use crate::bench::machine::Machine;
-use crate::bench::rays;
+use crate::bench::rays::{self, RaySet};
 use crate::bench::report::{Format, Model, Rays, Report, text};
 use crate::bench::row::Row;
 use crate::bench::sweep::Sweep;
@@ -158,54 +158,72 @@ fn files(args: &BenchArgs) -> Result<Vec<(PathBuf, Format)>, Wrong> {
     Ok(files)
 }
 
+/// A model of which nothing is measured yet: what it is, and which rays are sent, down to which depth.
+fn head(prepared: &Prepared, name: &str, plan: &Plan, (sets, depth): (&[RaySet], u32)) -> Model {
+    let Prepared { world, settings, .. } = prepared;
+    Model {
+        name: name.to_owned(),
+        hash: prepared.loaded.facts.hash,
+        prims: world.len(),
+        objects: world.objects(),
+        kept: world.kept.placed().len(),
+        auto: plan.sweep.is_none().then(|| world.judged()),
+        width: settings.width,
+        height: settings.height,
+        samples: settings.samples,
+        depth,
+        view: prepared.view_phrase.clone(),
+        camera: prepared.view,
+        rays: sets.iter().map(Rays::of).collect(),
+        rows: Vec::new(),
+        left_out: Vec::new(),
+        pruning: None,
+    }
+}
+
 impl Bench<'_> {
     /// One model: its rays, its rows, its tables.
     fn model(&self, subject: &Subject, report: &mut Report) -> Exit {
-        let prepared = match Prepared::new(subject, self.args, &self.messages) {
-            Ok(prepared) => prepared,
-            Err(exit) => return exit,
-        };
-        if let Err(fault) = self.spares(&prepared.loaded) {
-            return self.messages.fail(&fault, Exit::Failed);
-        }
-        let name = subject.to_string();
-        let (plan, mut left_out) = match self.bearable(report, &prepared) {
-            Ok(plan) => plan,
-            Err(why) => {
-                self.messages.info("size-left-out", format!("{name} is left out: {why}"));
-                return Exit::Done;
-            }
-        };
-        let plan = match self.able(plan, &prepared, &name, &mut left_out) {
-            Ok(plan) => plan,
-            Err(exit) => return exit,
-        };
-        self.messages.info("progress", format!("{name}: recording rays"));
-        let Some((sets, depth)) = prepared.with_job(|job| rays::record(job, plan.rays, plan.seed)) else {
-            let fault = Diagnostic::new("threads", name, "", "the rays could not be recorded");
-            return self.messages.fail(&fault, Exit::Failed);
-        };
-        let settings = &prepared.settings;
-        report.models.push(Model {
-            name: name.clone(),
-            hash: prepared.loaded.facts.hash,
-            prims: prepared.world.len(),
-            objects: prepared.world.objects(),
-            kept: prepared.world.kept.placed().len(),
-            auto: plan.sweep.is_none().then(|| prepared.world.judged()),
-            width: settings.width,
-            height: settings.height,
-            samples: settings.samples,
-            depth,
-            view: prepared.view_phrase.clone(),
-            camera: prepared.view,
-            rays: sets.iter().map(Rays::of).collect(),
-            rows: Vec::new(),
-            left_out,
-            pruning: None,
-        });
+        self.measure(subject, report).unwrap_or_else(|exit| exit)
+    }
 
-        // After each structure the report is written, so that a crash costs one row.
+    fn measure(&self, subject: &Subject, report: &mut Report) -> Result<Exit, Exit> {
+        let prepared = Prepared::new(subject, self.args, &self.messages)?;
+        self.spares(&prepared.loaded).map_err(|fault| self.messages.fail(&fault, Exit::Failed))?;
+        let name = subject.to_string();
+        let (plan, mut left_out) = self.bearable(report, &prepared).map_err(|why| {
+            self.messages.info("size-left-out", format!("{name} is left out: {why}"));
+            Exit::Done
+        })?;
+        let plan = self.able(plan, &prepared, &name, &mut left_out)?;
+        self.messages.info("progress", format!("{name}: recording rays"));
+        let (sets, depth) = prepared.with_job(|job| rays::record(job, plan.rays, plan.seed)).ok_or_else(|| {
+            let fault = Diagnostic::new("threads", &name, "", "the rays could not be recorded");
+            self.messages.fail(&fault, Exit::Failed)
+        })?;
+        let head = Model { left_out, ..head(&prepared, &name, &plan, (&sets, depth)) };
+        report.models.push(head);
+
+        let mut worst = self.rows(report, &prepared, &plan, (&name, &sets))?;
+        if plan.passes > 0 && plan.sweep.is_none() && report.family.is_none() {
+            self.messages.info("progress", format!("{name}: rendering with every code path on"));
+            let pruning = prepared.pruning(plan.passes);
+            report.models.iter_mut().last().into_iter().for_each(|model| model.pruning.clone_from(&pruning));
+            worst = worst.max(self.write(report));
+        }
+        let model = report.models.last().ok_or(Exit::Failed)?;
+        let tables = if report.family.is_some() { text::write_short(model) } else { text::write(report, model) + "\n" };
+        Ok(worst.max(self.print(&tables)).max(self.verdict(model)))
+    }
+
+    /// Sends the rays through every structure. After each the report is written, so that a crash costs one row.
+    fn rows(
+        &self,
+        report: &mut Report,
+        prepared: &Prepared,
+        plan: &Plan,
+        (name, sets): (&str, &[RaySet]),
+    ) -> Result<Exit, Exit> {
         let mut written = Exit::Done;
         let mut done = 0;
         let mut go_on = |rows: &[Row], what: &str| {
@@ -216,23 +234,14 @@ impl Bench<'_> {
             }
             !interrupt::raised()
         };
+        let Prepared { world, loaded, settings, .. } = prepared;
         // Maps of each value would be too many to look at.
         let pixels = if plan.sweep.is_some() { 0 } else { settings.width as usize * settings.height as usize };
-        let textures = TextureStore::new(&prepared.loaded.scene);
-        let filters = Filters::of(&prepared.loaded.scene, &prepared.world, &textures, settings);
-        let Some(rows) = compare(&prepared.world, filters.as_ref(), &sets, pixels, &plan, &mut go_on) else {
-            return if interrupt::raised() { Exit::Interrupted } else { self.no_threads(&name, plan.threads) };
-        };
-        if plan.passes > 0 && plan.sweep.is_none() && report.family.is_none() {
-            self.messages.info("progress", format!("{name}: rendering with every code path on"));
-            let pruning = prepared.pruning(plan.passes);
-            report.models.iter_mut().last().into_iter().for_each(|model| model.pruning.clone_from(&pruning));
-        }
-        written = written.max(self.keep(report, &rows));
-        let Some(model) = report.models.last() else { return Exit::Failed };
-        let tables = if report.family.is_some() { text::write_short(model) } else { text::write(report, model) + "\n" };
-        written = written.max(self.print(&tables));
-        written.max(self.verdict(model))
+        let textures = TextureStore::new(&loaded.scene);
+        let filters = Filters::of(&loaded.scene, world, &textures, settings);
+        let rows = compare(world, filters.as_ref(), sets, pixels, plan, &mut go_on)
+            .ok_or_else(|| if interrupt::raised() { Exit::Interrupted } else { self.no_threads(name, plan.threads) })?;
+        Ok(written.max(self.keep(report, &rows)))
     }
 
     /// Whether what was measured agrees with itself; else it is said.

@@ -136,26 +136,22 @@
 //! # or ortho = 10               # height seen by parallel rays
 //! ```
 
+mod assemble;
 mod materials;
 mod reader;
 mod shapes;
 mod view;
 mod weight;
 
+use self::assemble::assemble;
 use self::reader::{Faults, Table, color, number, string, word};
 use self::shapes::Lost;
 use self::weight::weight;
-use super::limits::{Budget, Limits};
-use super::panorama::{self, LoadedPanorama};
-use super::paths::Resolver;
-use super::texture::smaller_copies;
-use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
+use super::limits::Budget;
+use super::{Diagnostic, LoadError, LoadOptions, Loaded, Source};
 use crate::math::DVec3;
-use crate::scene::merge::Stored;
-use crate::scene::{Background, Bitmap, Environment, Material, Panorama, Scene, UpAxis};
-use crate::stopwatch::Stopwatch;
+use crate::scene::{Background, Environment, Material, Scene, UpAxis};
 use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
@@ -253,28 +249,7 @@ fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -
         models.extend(model(&mut scene, &mut names, table));
     }
     let mut lost = Lost::default();
-    let mut inline = Vec::new();
-    for table in root.tables("meshes", "mesh") {
-        let material = names.material(&mut scene, &table);
-        inline.extend(shapes::mesh(table, material, &mut lost));
-    }
-    let max_rounding = shapes::place(inline, &mut scene, &mut lost);
-    for table in root.tables("spheres", "sphere") {
-        let material = names.material(&mut scene, &table);
-        scene.spheres.extend(shapes::sphere(table, material, &mut lost));
-    }
-    for table in root.tables("cones", "cone") {
-        let material = names.material(&mut scene, &table);
-        scene.cones.extend(shapes::cone(table, material, &mut lost));
-    }
-    for table in root.tables("cylinders", "cylinder") {
-        let material = names.material(&mut scene, &table);
-        scene.cones.extend(shapes::cylinder(table, material, &mut lost));
-    }
-    for table in root.tables("planes", "plane") {
-        let material = names.material(&mut scene, &table);
-        scene.planes.extend(shapes::plane(table, material, &mut lost));
-    }
+    let max_rounding = add_shapes(&root, &mut scene, &mut names, &mut lost);
     for table in root.tables("lights", "light") {
         match view::light(table) {
             Some(view::Lit::Light(light)) => scene.lights.push(light),
@@ -289,6 +264,33 @@ fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -
     scene.hints.camera = (!scene.cameras.is_empty()).then_some(0);
     root.finish();
     Parsed { scene, models, panorama, lost, max_rounding }
+}
+
+/// Adds all shapes that the file has itself; the largest displacement of a vertex by rounding.
+fn add_shapes(root: &Table, scene: &mut Scene, names: &mut Names, lost: &mut Lost) -> f64 {
+    let mut inline = Vec::new();
+    for table in root.tables("meshes", "mesh") {
+        let material = names.material(scene, &table);
+        inline.extend(shapes::mesh(table, material, lost));
+    }
+    let max_rounding = shapes::place(inline, scene, lost);
+    for table in root.tables("spheres", "sphere") {
+        let material = names.material(scene, &table);
+        scene.spheres.extend(shapes::sphere(table, material, lost));
+    }
+    for table in root.tables("cones", "cone") {
+        let material = names.material(scene, &table);
+        scene.cones.extend(shapes::cone(table, material, lost));
+    }
+    for table in root.tables("cylinders", "cylinder") {
+        let material = names.material(scene, &table);
+        scene.cones.extend(shapes::cylinder(table, material, lost));
+    }
+    for table in root.tables("planes", "plane") {
+        let material = names.material(scene, &table);
+        scene.planes.extend(shapes::plane(table, material, lost));
+    }
+    max_rounding
 }
 
 fn model(scene: &mut Scene, names: &mut Names, table: Table) -> Option<Model> {
@@ -374,175 +376,8 @@ fn environment(value: &DeValue) -> Result<Environment, String> {
     }
 }
 
-/// Looks for all files that are named, before any is read, so that all that are not there are told at once.
-fn check_files(
-    models: &[Model],
-    panorama: Option<&Surrounding>,
-    faults: &Faults,
-    resolver: &Resolver,
-) -> Result<(), LoadError> {
-    let of_models = models.iter().map(|model| (&model.file, model.at));
-    for (file, at) in of_models.chain(panorama.map(|picture| (&picture.file, picture.at))) {
-        if let Err(fault) = resolver.locate(Path::new(file)) {
-            faults.note_file(at, &fault);
-        }
-    }
-    faults.check()
-}
-
-/// What [`Facts::format`] says of scene files.
+/// What [`super::Facts::format`] says of scene files.
 pub const FORMAT: &str = "meshray scene";
-
-/// Reads the models and puts everything together.
-fn assemble(
-    parsed: Parsed,
-    faults: &Faults,
-    source: &Source,
-    options: &LoadOptions,
-    budget: &mut Budget,
-) -> Result<Loaded, LoadError> {
-    let Parsed { mut scene, models, panorama, lost, max_rounding } = parsed;
-    let mut warnings = Warnings::default();
-    let mut facts = Facts { format: FORMAT.into(), max_rounding, ..Facts::default() };
-    facts.faces = scene.meshes.iter().map(|mesh| mesh.faces() as u64).sum();
-    lost.tell(faults, &source.path, &mut facts, &mut warnings);
-    let mut resolver = Resolver::new(source, options);
-    check_files(&models, panorama.as_ref(), faults, &resolver)?;
-    if let Some(surrounding) = panorama {
-        let read = look_around(surrounding, faults, &mut resolver, source, options, budget)?;
-        read.warnings.into_iter().for_each(|w| warnings.push(w));
-        scene.panorama = Some(read.panorama);
-    }
-    // What several models show is read and stored once.
-    let mut known: HashMap<(String, Option<UpAxis>, Option<u32>), Known> = HashMap::new();
-    for model in models {
-        let over = |over| Diagnostic { place: faults.place(model.at), ..Diagnostic::over_budget(&source.path, over) };
-        let [meshes, spheres, cones, planes] =
-            [scene.meshes.len(), scene.spheres.len(), scene.cones.len(), scene.planes.len()];
-        let place = &model.world_from_model;
-        let key = (model.file.clone(), model.up, model.material);
-        let found = match known.entry(key) {
-            Entry::Occupied(known) => {
-                let Known { places, stored, .. } = known.get();
-                budget.take(places.bytes(), 1).map_err(over)?;
-                scene.place(places.clone(), *stored, place);
-                &known.into_mut().facts
-            }
-            Entry::Vacant(first) => {
-                // What is needed only while a model is read is free for the next one.
-                let mut own = *budget;
-                let before = options.animations_before.unwrap_or(0) + facts.animations.len();
-                let options = LoadOptions { animations_before: Some(before), ..options.clone() };
-                let part = read_model(&model, faults, &mut resolver, source, &options, &mut own)?;
-                facts.add_animations(&part.facts);
-                budget.take(kept(&part.scene), 1).map_err(over)?;
-                part.warnings.into_iter().for_each(|w| warnings.push(w));
-                facts.reading += part.facts.reading;
-                facts.decoding += part.facts.decoding;
-                let places = part.scene.places();
-                let stored = scene.append(part.scene, place);
-                &first.insert(Known { places, stored, facts: part.facts }).facts
-            }
-        };
-        resolver.absorb(&found.files, found.hash, found.gaps);
-        tell(&mut facts, found, shapes::stretch(place));
-        // Shapes count on from this scene's materials once they are appended, so an override comes after.
-        if let Some(material) = model.material {
-            scene.meshes[meshes..].iter_mut().for_each(|mesh| mesh.material = material);
-            scene.spheres[spheres..].iter_mut().for_each(|sphere| sphere.material = material);
-            scene.cones[cones..].iter_mut().for_each(|cone| cone.material = material);
-            scene.planes[planes..].iter_mut().for_each(|plane| plane.material = material);
-        }
-    }
-    facts.reading += resolver.reading();
-    (facts.files, facts.hash, facts.gaps) = resolver.finish();
-    Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
-}
-
-/// Reads the picture of what surrounds the scene.
-fn look_around(
-    Surrounding { file, at, rotation }: Surrounding,
-    faults: &Faults,
-    resolver: &mut Resolver,
-    source: &Source,
-    options: &LoadOptions,
-    budget: &mut Budget,
-) -> Result<LoadedPanorama, LoadError> {
-    let over = |over| Diagnostic::over_budget(&source.path, over);
-    // The file itself is needed no longer than until it is decoded.
-    let bytes = resolver
-        .read_file_within(Path::new(&file), &mut budget.clone())
-        .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &faults.place(at))))?
-        .map_err(over)?;
-    let picture = Source { path: source.path.with_file_name(&file), bytes };
-    let left = Limits { memory: budget.left(), ..options.limits };
-    let read = panorama::decode(&picture, &left)?;
-    budget.take(read.panorama.texels.len() as u64, panorama::PER_PIXEL).map_err(over)?;
-    Ok(LoadedPanorama { panorama: Panorama { rotation, ..read.panorama }, ..read })
-}
-
-/// A model that was read.
-struct Known {
-    places: Scene,
-    stored: Stored,
-    facts: Facts,
-}
-
-/// Adds what was found out about a model that is shown once more, stretched so much.
-fn tell(facts: &mut Facts, found: &Facts, stretch: f64) {
-    facts.faces += found.faces;
-    facts.dropped.extend_from_slice(&found.dropped);
-    facts.wires.append(&found.wires);
-    facts.extensions.extend_from_slice(&found.extensions);
-    // A scene file has none of its own; those of its first model that has any are told.
-    if facts.scenes.is_empty() {
-        (facts.scenes, facts.scene_index) = (found.scenes.clone(), found.scene_index);
-    }
-    if facts.variants.is_empty() {
-        (facts.variants, facts.variant) = (found.variants.clone(), found.variant);
-    }
-    facts.max_rounding = facts.max_rounding.max(found.max_rounding * stretch);
-}
-
-fn read_model(
-    model: &Model,
-    faults: &Faults,
-    resolver: &mut Resolver,
-    source: &Source,
-    options: &LoadOptions,
-    budget: &mut Budget,
-) -> Result<Loaded, LoadError> {
-    let place = || faults.place(model.at);
-    let path = resolver
-        .locate(Path::new(&model.file))
-        .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &place())))?;
-    let options = LoadOptions { root: Some(resolver.root().to_path_buf()), up: model.up, ..options.clone() };
-    let watch = Stopwatch::of_this_thread();
-    let model_source = super::read_source(&path, &options.limits)?;
-    let reading = watch.read();
-    // Asked before it is read, or a file that names itself would never end.
-    if matches!(super::detect::detect(&model_source)?, super::detect::Format::SceneFile) {
-        let text = format!("`{}` is a scene file, and scene files do not nest", model.file);
-        return Err(Diagnostic::new("scene-nested", &source.path, place(), text).remedy("name a model").into());
-    }
-    let mut loaded = super::load_within(&model_source, &options, budget)?;
-    loaded.facts.reading += reading;
-    // It was read where it really lies; a copy of the whole would still name that.
-    let named = resolver.as_named(Path::new(&model.file));
-    for file in &mut loaded.facts.files {
-        let below = path.parent().and_then(|folder| file.path.strip_prefix(folder).ok());
-        if let (Some(below), Some(folder)) = (below, named.parent()) {
-            file.path = folder.join(below);
-        }
-    }
-    Ok(loaded)
-}
-
-/// Bytes that a model takes once it is read.
-fn kept(scene: &Scene) -> u64 {
-    let pixels = |bitmap: &Bitmap| u64::from(bitmap.width) * u64::from(bitmap.height);
-    scene.bytes() + scene.bitmaps.iter().map(|bitmap| smaller_copies(pixels(bitmap))).sum::<u64>()
-}
 
 #[expect(clippy::cast_possible_truncation, reason = "a scene file is far smaller than 2^32 lines")]
 fn count(n: usize) -> u32 {

@@ -76,23 +76,7 @@ impl<'a> Placing<'a> {
         first_triangle.push(index(shapes.triangles.len()) + kept.shown());
         first_polygon.push(index(shapes.polygons.len()));
 
-        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
-        {
-            let sphere = |s: &crate::scene::Sphere| SpherePrim {
-                center: (s.center - center).as_vec3(),
-                radius: s.radius as f32,
-            };
-            shapes.spheres = scene.spheres.iter().map(sphere).collect();
-            let cone = |c: &crate::scene::Cone| Cone {
-                base: (c.base - center).as_vec3(),
-                base_radius: c.base_radius as f32,
-                apex: (c.apex - center).as_vec3(),
-                apex_radius: c.apex_radius as f32,
-            };
-            shapes.cones = scene.cones.iter().map(cone).collect();
-            let plane = |p: &crate::scene::Plane| (p.normal.as_vec3(), (p.offset - p.normal.dot(center)) as f32);
-            shapes.planes = scene.planes.iter().map(plane).collect();
-        }
+        put_solids(scene, center, &mut shapes);
 
         let placements = scene.instances.iter().map(|i| Placement::new(i.world_from_object.matrix3)).collect();
         let is_open =
@@ -106,6 +90,23 @@ impl<'a> Placing<'a> {
         world.shapes.opaque = world.opaque_bits(scene, &solids);
         world
     }
+}
+
+/// Stores spheres, cones and planes around the centre.
+#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
+fn put_solids(scene: &Scene, center: DVec3, shapes: &mut Shapes) {
+    let sphere =
+        |s: &crate::scene::Sphere| SpherePrim { center: (s.center - center).as_vec3(), radius: s.radius as f32 };
+    shapes.spheres = scene.spheres.iter().map(sphere).collect();
+    let cone = |c: &crate::scene::Cone| Cone {
+        base: (c.base - center).as_vec3(),
+        base_radius: c.base_radius as f32,
+        apex: (c.apex - center).as_vec3(),
+        apex_radius: c.apex_radius as f32,
+    };
+    shapes.cones = scene.cones.iter().map(cone).collect();
+    let plane = |p: &crate::scene::Plane| (p.normal.as_vec3(), (p.offset - p.normal.dot(center)) as f32);
+    shapes.planes = scene.planes.iter().map(plane).collect();
 }
 
 /// Bytes of the triangles of these instances, each stored by itself, with a structure over them, at least.

@@ -235,6 +235,13 @@ fn parts(colors: Vec<[f32; 4]>) -> (Vec<[f32; 3]>, Vec<f32>) {
 /// So many digits that the rounding to `f32` alone counts.
 const EXACT: i32 = 30;
 
+/// The warning that no face shows a picture, though some may say which part of one.
+fn picture_unused((line, name): &(u32, String), has_places: bool, file: &Path) -> Diagnostic {
+    let why = if has_places { "no face shows it" } else { "no face says where it shows which part of it" };
+    let text = format!("picture '{}' is not drawn: {why}", shorten(name));
+    Diagnostic::new("picture-unused", file, line.to_string(), text)
+}
+
 /// Where the corners of faces with so many begin.
 fn first_corners(arities: &[u32]) -> Vec<u32> {
     let mut next = 0;
@@ -292,13 +299,9 @@ fn geometry(mut bare: Bare, file: &Path, warnings: &mut Warnings) -> Geometry {
     };
     let faces: Vec<Face> = arities.par_iter().zip(&firsts).with_min_len(MANY).enumerate().map(face).collect();
     let is_plain = faces.par_iter().all(|face| face.run == 0);
-    if let Some((line, name)) = pictures.first().filter(|_| is_plain) {
-        let why = match numbers.iter().all(|&uv| uv == NONE) {
-            true => "no face says where it shows which part of it",
-            false => "no face shows it",
-        };
-        let text = format!("picture '{}' is not drawn: {why}", shorten(name));
-        warnings.push(Diagnostic::new("picture-unused", file, line.to_string(), text));
+    if let Some(picture) = pictures.first().filter(|_| is_plain) {
+        let has_places = numbers.iter().any(|&uv| uv != NONE);
+        warnings.push(picture_unused(picture, has_places, file));
     }
     let of_picture = |number| Run { material: Some(number), ..Run::default() };
     let shown = if is_plain { 0 } else { pictures.len() as u32 };
