@@ -40,7 +40,7 @@ pub(super) fn fill(template: &str, fields: &Fields) -> Result<PathBuf, String> {
 }
 
 /// The folder below which a template makes folders of its own: that in front of its first field, but for `{dir}`, which is
-/// there; `None` of a name without fields.
+/// there; `None` of a name without other fields.
 pub(super) fn grows_in(template: &str, fields: &Fields) -> Result<Option<PathBuf>, String> {
     let (before, found) = filled(template, fields, |field| field != "dir")?;
     let folder =

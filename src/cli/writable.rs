@@ -95,10 +95,10 @@ pub(super) fn check_target(target: &Target, growth: Option<&Path>, sources: &Sou
     Ok(())
 }
 
-/// Whether a folder is there or can be made in one that is.
+/// Whether a folder is there or can be made in one that is; not where a link leads nowhere.
 fn can_be(folder: &Path) -> bool {
     let parent = folder.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    folder.is_dir() || !folder.exists() && parent.is_dir() && folder_takes(folder)
+    folder.is_dir() || folder.symlink_metadata().is_err() && parent.is_dir() && folder_takes(folder)
 }
 
 /// [`check`] for every `--report`, before any work.

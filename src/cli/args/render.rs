@@ -29,7 +29,7 @@ pub(in crate::cli) struct RenderArgs {
     ///
     /// Without it the picture goes to STEM.png in the current folder. Pictures of models in the folders of a folder that was
     /// named go to folders like these: {sub} is the way from the folder that was named to the model's own. A folder given here
-    /// is made, and so are those of a template, where what it lies in is there.
+    /// is made, and so are those of a template with fields other than {dir}, where what the first lies in is there.
     /// Names that are made up, in a folder given here and of heat maps too, replace only a picture that meshray wrote; a name
     /// given here replaces whatever is there.
     #[arg(short, long, value_name = "PATH", help_heading = "Output", allow_hyphen_values = true)]

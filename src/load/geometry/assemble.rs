@@ -1,6 +1,6 @@
 //! Faces -> meshes: one for each run of faces that share object, group and material.
 
-use super::color::Linear;
+use super::color::linear;
 use super::pairs::Pairs;
 use super::smooth::{Smooth, smooth};
 use super::soup::{Corner, NONE, Soup};
@@ -360,8 +360,7 @@ pub(super) fn colors(soup: &Soup, positions: impl IndexedParallelIterator<Item =
     if !is_colored && soup.alphas.is_empty() {
         return Vec::new();
     }
-    let linear = Linear::new();
-    let light = |p: usize| if is_colored { linear.of(soup.colors[p]) } else { Vec4::ONE };
+    let light = |p: usize| if is_colored { linear(soup.colors[p]) } else { Vec4::ONE };
     let color = |p: usize| light(p).truncate().extend(soup.alphas.get(p).copied().unwrap_or(1.0));
     positions.map(color).collect()
 }

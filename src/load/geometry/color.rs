@@ -4,31 +4,22 @@ use crate::load::Diagnostic;
 use crate::math::{Vec3, Vec4};
 use crate::scene::color::from_srgb;
 use std::path::Path;
+use std::sync::LazyLock;
 
-/// Vertex colours as written -> linear RGBA.
+/// Linear RGBA of a vertex colour as written.
 ///
 /// Programs that write them (scanners, sculpting and mesh repair programs) take them from 8-bit pictures and divide by
-/// 255, so they are sRGB-coded, unlike the colours of MTL files.
-pub(in crate::load) struct Linear {
-    /// Of 0/255 … 255/255.
-    of_bytes: [f32; 256],
-}
-
-impl Linear {
-    pub(in crate::load) fn new() -> Self {
-        Self { of_bytes: std::array::from_fn(|byte| decode(of_byte(byte))) }
-    }
-
-    /// Decodes a colour; looked up where its codes are those of bytes, which nearly all are: as exact, and much faster.
-    pub(in crate::load) fn of(&self, color: [f32; 3]) -> Vec4 {
-        let part = |code: f32| {
-            let code = code.clamp(0.0, 1.0);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 … 255")]
-            let byte = (code * 255.0).round() as usize;
-            if of_byte(byte) == code { self.of_bytes[byte] } else { decode(code) }
-        };
-        Vec3::from(color.map(part)).extend(1.0)
-    }
+/// 255, so they are sRGB-coded, unlike the colours of MTL files. Where codes are those of bytes, which nearly all are, they are
+/// looked up: as exact, and much faster.
+pub(in crate::load) fn linear(color: [f32; 3]) -> Vec4 {
+    static OF_BYTES: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|byte| decode(of_byte(byte))));
+    let part = |code: f32| {
+        let code = code.clamp(0.0, 1.0);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 … 255")]
+        let byte = (code * 255.0).round() as usize;
+        if of_byte(byte) == code { OF_BYTES[byte] } else { decode(code) }
+    };
+    Vec3::from(color.map(part)).extend(1.0)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "0 … 255")]
@@ -122,22 +113,20 @@ mod tests {
 
     #[test]
     fn black_white_and_middle_grey_are_decoded() {
-        let linear = Linear::new();
-        assert_eq!(linear.of([0.0, 1.0, 2.0]), Vec4::new(0.0, 1.0, 1.0, 1.0));
-        assert!((linear.of([0.5; 3]).x - 0.214_041).abs() < 1e-5);
+        assert_eq!(linear([0.0, 1.0, 2.0]), Vec4::new(0.0, 1.0, 1.0, 1.0));
+        assert!((linear([0.5; 3]).x - 0.214_041).abs() < 1e-5);
     }
 
     #[test]
     fn what_is_looked_up_is_what_would_be_computed() {
-        let linear = Linear::new();
         for byte in 0..=255u16 {
             let code = f32::from(byte) / 255.0;
             for code in [code, code.next_up(), code.next_down(), -code] {
-                let color = linear.of([code, 0.3, 1.0]);
+                let color = linear([code, 0.3, 1.0]);
                 assert_eq!(color.truncate(), from_srgb([code.clamp(0.0, 1.0), 0.3, 1.0]), "{code}");
             }
         }
-        assert!(linear.of([f32::NAN, 0.0, 0.0]).x.is_nan());
+        assert!(linear([f32::NAN, 0.0, 0.0]).x.is_nan());
     }
 
     #[test]

@@ -36,7 +36,8 @@ pub(in crate::load) struct Soup {
 }
 
 impl Soup {
-    /// Takes the places of vertices that nothing uses, neither its corners nor these, so that they move neither the centre nor the frame.
+    /// Takes the places of vertices that nothing uses, neither corners nor `triangles`, so that they move neither the centre
+    /// nor the frame.
     pub(in crate::load) fn leave_out_unused(&mut self, triangles: &[[u32; 3]]) {
         /// Corners and positions that one thread looks at at a time.
         const MANY: usize = 1 << 13;

@@ -6,7 +6,7 @@ use super::soup::{Corner, NONE, Soup};
 use super::{Geometry, Stroke};
 use crate::load::place::Placed;
 use crate::load::wires::Wires;
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::scene::Mesh;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -39,14 +39,25 @@ pub(super) fn assemble(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Vec
 /// All vertices as points.
 fn cloud(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Wires {
     let positions = placed.positions.clone();
-    // A few without a normal, of which scanners leave some, take no light from the others.
-    let said = soup.normals.par_iter().filter(|normal| **normal != Vec3::ZERO).count();
-    let is_lit = soup.normals.len() == positions.len() && 2 * said >= positions.len();
-    let normals = if is_lit { soup.normals.clone() } else { Vec::new() };
+    let normals = if soup.normals.len() == positions.len() { normals(soup.normals.clone()) } else { Vec::new() };
     let colors = colors(soup, (0..positions.len()).into_par_iter());
     #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32 vertices")]
     let ends = (0..positions.len() as u32).map(|i| [i; 2]).collect();
     Wires { mesh: Mesh { name: name(geometry, 0), positions, normals, colors, ..Mesh::default() }, ends }
+}
+
+/// The normals of points, where most have one: the others, of which scanners leave some, look where these do in the mean.
+fn normals(mut normals: Vec<Vec3>) -> Vec<Vec3> {
+    let said = || normals.iter().filter(|normal| **normal != Vec3::ZERO);
+    let count = said().count();
+    if 2 * count <= normals.len() {
+        return Vec::new();
+    }
+    if count < normals.len() {
+        let mean = said().map(|normal| normal.as_dvec3()).sum::<DVec3>().try_normalize().unwrap_or(DVec3::Y).as_vec3();
+        normals.iter_mut().filter(|normal| **normal == Vec3::ZERO).for_each(|normal| *normal = mean);
+    }
+    normals
 }
 
 fn wires(strokes: &[(Stroke, &[Corner])], soup: &Soup, placed: &Placed, vertices: &mut Pairs<Key>) -> Wires {

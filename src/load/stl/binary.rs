@@ -47,9 +47,12 @@ pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnost
     // As many as there are in memory.
     let records = if uncounted { records } else { &records[..claimed as usize] };
     let paint = Paint::of(&bytes[..80], records);
-    making.charge(records.len(), if paint.is_some() { Bare::COLOR } else { 0 })?;
-    let colors = |paint: Paint| records.par_iter().map(|record| paint.color(attributes(record))).collect();
-    let colors = paint.map_or_else(Vec::new, colors);
+    making.take(records.len())?;
+    let mut colors = Vec::new();
+    if let Some(paint) = paint {
+        making.take_colors(records.len())?;
+        records.par_iter().map(|record| paint.color(attributes(record))).collect_into_vec(&mut colors);
+    }
     // What was single precision is told apart as such.
     let bits = |place: DVec3| place.as_vec3().to_array().map(f32::to_bits);
     let mut bare = making.triangles(3 * records.len(), |corner| place(records, corner), bits, colors)?;

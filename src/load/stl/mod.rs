@@ -43,7 +43,7 @@ pub fn load(
     options: &LoadOptions,
     budget: &mut Budget,
 ) -> Result<Loaded, LoadError> {
-    let making = Making { file: &source.path, budget: &mut *budget };
+    let making = Making { file: &source.path, budget: &mut *budget, held: 0 };
     let (bare, format) = match encoding {
         Encoding::Text => (text::read(source, making)?, "STL (ascii)"),
         Encoding::Binary => (binary::read(source, making)?, "STL (binary)"),
@@ -53,18 +53,32 @@ pub fn load(
     bare::load(bare, format, otherwise, source, options, budget)
 }
 
-/// What triangles are made into, and what that comes out of.
+/// What the memory comes out of that triangles are made with.
 struct Making<'a> {
     file: &'a Path,
     budget: &'a mut Budget,
+    /// Bytes of what is forgotten when vertices are known.
+    held: u64,
 }
 
 impl Making<'_> {
-    /// Takes the memory of so many triangles before they are made, and of what so many bytes hold of each until then.
-    fn charge(&mut self, triangles: usize, bytes: u64) -> Result<(), Diagnostic> {
-        let count = triangles as u64;
-        let taken = Bare::charge_faces(self.budget, count, 3).and_then(|()| self.budget.take(count, bytes));
+    /// Takes the memory of so many triangles, before they are made.
+    fn take(&mut self, triangles: usize) -> Result<(), Diagnostic> {
+        let taken = Bare::charge_faces(self.budget, triangles as u64, 3);
         taken.map_err(|over| Diagnostic::over_budget(self.file, over))
+    }
+
+    /// The same of their colours.
+    fn take_colors(&mut self, triangles: usize) -> Result<(), Diagnostic> {
+        let taken = self.budget.take(triangles as u64, Bare::COLOR);
+        taken.map_err(|over| Diagnostic::over_budget(self.file, over))
+    }
+
+    /// Makes sure of room for what is held until vertices are known, so many times so many bytes more than before.
+    fn hold(&mut self, count: usize, bytes: u64) -> Result<(), Diagnostic> {
+        self.held = self.held.saturating_add((count as u64).saturating_mul(bytes));
+        let mut for_now = *self.budget;
+        for_now.take(self.held, 1).map_err(|over| Diagnostic::over_budget(self.file, over))
     }
 
     /// Triangles whose memory was taken: corner `c` is at `place(c)`, and equal places, which are told by their `bits`, become
@@ -73,29 +87,23 @@ impl Making<'_> {
     /// # Errors
     /// When there are too many, or memory for what joins them is not left.
     fn triangles<P: Pod + Eq + Send + Sync>(
-        self,
+        mut self,
         corners: usize,
         place: impl Fn(usize) -> DVec3 + Sync,
         bits: impl Fn(DVec3) -> P + Sync,
         colors: Vec<[f32; 4]>,
     ) -> Result<Bare, Diagnostic> {
-        let over = |over| Diagnostic::over_budget(self.file, over);
-        self.budget.take(corners as u64, weld::cost::<P>()).map_err(over)?;
+        self.hold(corners, weld::cost::<P>())?;
         if corners > weld::LARGEST {
-            return Err(self.too_large("corners", weld::LARGEST as u64));
+            let text = format!("more than {} corners", weld::LARGEST);
+            return Err(Diagnostic::new("stl-too-large", self.file, "", text).remedy("split the file"));
         }
         // Adding 0 makes one zero of two.
         let Welded { firsts, vertices } = weld(corners, |corner| bits(place(corner) + DVec3::ZERO));
-        Bare::charge_vertices(self.budget, firsts.len() as u64).map_err(over)?;
-        if firsts.len() as u64 > Bare::LARGEST {
-            return Err(self.too_large("vertices", Bare::LARGEST));
-        }
+        Bare::charge_vertices(self.budget, firsts.len() as u64)
+            .map_err(|over| Diagnostic::over_budget(self.file, over))?;
         let positions = firsts.par_iter().map(|&corner| place(corner as usize)).collect();
         Ok(Bare::of_triangles(positions, vertices, colors))
-    }
-
-    fn too_large(&self, what: &str, most: u64) -> Diagnostic {
-        Diagnostic::new("stl-too-large", self.file, "", format!("more than {most} {what}")).remedy("split the file")
     }
 }
 

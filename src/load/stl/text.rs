@@ -33,7 +33,8 @@ pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnost
                 names.push(name);
             }
         } else if is(word, "facet") {
-            making.charge(1, FACET)?;
+            making.take(1)?;
+            making.hold(1, FACET)?;
             facets.push(facet(&mut words)?);
         } else if is(word, "endsolid") {
             open = false;

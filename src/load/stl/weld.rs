@@ -4,6 +4,7 @@
 //! side: a table for all would miss the cache at nearly every corner. The hash has a seed of its own in each run, so that no
 //! file can be made whose places meet in one slot; numbers do not depend on it.
 
+use crate::load::geometry::bare::Bare;
 use bytemuck::Pod;
 use rayon::prelude::*;
 use std::hash::{BuildHasher, RandomState};
@@ -22,7 +23,7 @@ pub(super) struct Welded {
 }
 
 /// The most corners.
-pub(super) const LARGEST: usize = (FIRST - 1) as usize;
+pub(super) const LARGEST: usize = Bare::LARGEST as usize;
 
 /// Marks the number of a vertex at the corner where it is first met; without it a number is that of such a corner.
 const FIRST: u32 = 1 << 31;
@@ -36,7 +37,7 @@ const TABLE: usize = 1 << 13;
 /// The most tables, as powers of two.
 const TABLES: u32 = 12;
 
-/// Bytes that a corner takes until vertices are known.
+/// Bytes that a corner takes until vertices are known; slots take little beside, since tables are many.
 pub(super) const fn cost<P>() -> u64 {
     (size_of::<Card<P>>() + 3 * size_of::<u32>()) as u64
 }
@@ -49,11 +50,13 @@ pub(super) fn weld<P: Pod + Eq + Send + Sync>(corners: usize, place: impl Fn(usi
         .map(|part| Hand::deal(part * DEALT..corners.min((part + 1) * DEALT), &place, &hash))
         .collect();
     let first: Vec<AtomicU32> = (0..corners).into_par_iter().map(|_| AtomicU32::new(0)).collect();
-    let fill = |slots: &mut Vec<Card<P>>, table| {
-        let cards = hands.iter().flat_map(|hand| hand.of_table(table));
-        find_firsts(slots, hands.iter().map(|hand| hand.of_table(table).len()).sum(), cards, &hash, &first);
+    let fill = |slots: &mut Slots<P>, table| {
+        slots.clear();
+        for card in hands.iter().flat_map(|hand| hand.of_table(table)) {
+            first[card.corner as usize].store(slots.first(*card, &hash), Relaxed);
+        }
     };
-    (0..1 << hash.bits).into_par_iter().for_each_init(Vec::new, fill);
+    (0..1 << hash.bits).into_par_iter().for_each_init(|| Slots::new(corners), fill);
     drop(hands);
     number(&first)
 }
@@ -90,6 +93,17 @@ struct Card<P> {
     corner: u32,
 }
 
+impl<P: Pod> Card<P> {
+    /// That of no corner.
+    fn none() -> Self {
+        Self { place: P::zeroed(), corner: u32::MAX }
+    }
+
+    fn is_none(&self) -> bool {
+        self.corner == u32::MAX
+    }
+}
+
 /// Corners that follow each other, sorted by table.
 struct Hand<P> {
     cards: Vec<Card<P>>,
@@ -110,7 +124,7 @@ impl<P: Pod> Hand<P> {
             *start = sum;
         });
         let mut next = starts.clone();
-        let mut cards = vec![Card { place: P::zeroed(), corner: 0 }; tables.len()];
+        let mut cards = vec![Card::none(); tables.len()];
         for ((place, corner), table) in places.zip(corners).zip(tables) {
             let at = &mut next[table as usize];
             cards[*at as usize] = Card { place, corner: corner as u32 };
@@ -124,26 +138,54 @@ impl<P: Pod> Hand<P> {
     }
 }
 
-/// Finds for each of these corners, in the file's order, the first one in its place.
-fn find_firsts<'a, P: Pod + Eq>(
-    slots: &mut Vec<Card<P>>,
-    count: usize,
-    cards: impl Iterator<Item = &'a Card<P>>,
-    hash: &Hash,
-    first: &[AtomicU32],
-) {
-    const NOTHING: u32 = u32::MAX;
-    slots.clear();
-    slots.resize((2 * count).next_power_of_two(), Card { place: P::zeroed(), corner: NOTHING });
-    for card in cards {
-        let mut at = hash.slot(&card.place, slots.len());
-        while slots[at].corner != NOTHING && slots[at].place != card.place {
-            at = (at + 1) & (slots.len() - 1);
+/// The first card of each place of a table, where it is looked for; never more than half full.
+struct Slots<P> {
+    slots: Vec<Card<P>>,
+    places: usize,
+}
+
+impl<P: Pod + Eq> Slots<P> {
+    /// With room for a table, or for so many corners.
+    fn new(corners: usize) -> Self {
+        let room = 2 * corners.clamp(1, TABLE).next_power_of_two();
+        Self { slots: vec![Card::none(); room], places: 0 }
+    }
+
+    fn clear(&mut self) {
+        self.slots.fill(Card::none());
+        self.places = 0;
+    }
+
+    /// The corner that was first met where this card is; its own if none was.
+    fn first(&mut self, card: Card<P>, hash: &Hash) -> u32 {
+        let at = self.find(&card, hash);
+        if !self.slots[at].is_none() {
+            return self.slots[at].corner;
         }
-        if slots[at].corner == NOTHING {
-            slots[at] = *card;
+        self.slots[at] = card;
+        self.places += 1;
+        if 2 * self.places > self.slots.len() {
+            self.double(hash);
         }
-        first[card.corner as usize].store(slots[at].corner, Relaxed);
+        card.corner
+    }
+
+    /// The slot of a place, or the empty one where it belongs.
+    fn find(&self, card: &Card<P>, hash: &Hash) -> usize {
+        let mut at = hash.slot(&card.place, self.slots.len());
+        while !self.slots[at].is_none() && self.slots[at].place != card.place {
+            at = (at + 1) & (self.slots.len() - 1);
+        }
+        at
+    }
+
+    fn double(&mut self, hash: &Hash) {
+        let twice = vec![Card::none(); 2 * self.slots.len()];
+        let before = std::mem::replace(&mut self.slots, twice);
+        for card in before.into_iter().filter(|card| !card.is_none()) {
+            let at = self.find(&card, hash);
+            self.slots[at] = card;
+        }
     }
 }
 

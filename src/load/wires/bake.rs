@@ -19,8 +19,8 @@ pub(super) struct Baked {
 /// Points and lines of one mesh, so that its corners can be counted.
 const RUN: usize = 1 << 24;
 
-/// Bytes that the solids of `wires` take, at most.
-pub(super) fn cost(wires: &Wires, widths: &Widths) -> u64 {
+/// Bytes that the solids of `wires` take, at most: in meshes, and beside these while they are made.
+pub(super) fn cost(wires: &Wires, widths: &Widths) -> [u64; 2] {
     let [points, lines] = wires.count();
     let mesh = &wires.mesh;
     let of = |there: bool, bytes: usize| if there { bytes } else { 0 };
@@ -31,7 +31,8 @@ pub(super) fn cost(wires: &Wires, widths: &Widths) -> u64 {
         + mesh.uvs.iter().map(|uvs| of(!uvs.is_empty(), 8)).sum::<usize>();
     let bytes = |shape: Shape| (shape.corners * corner + shape.triangles * (12 + 4)) as u64;
     let (point, line) = (bytes(Shape::of_point(wires.is_lit(), widths)), bytes(Shape::OF_LINE));
-    points.saturating_mul(point).saturating_add(lines.saturating_mul(line))
+    let held = (points + lines).min(BATCH as u64) * point.max(line);
+    [points.saturating_mul(point).saturating_add(lines.saturating_mul(line)), held]
 }
 
 /// How much of a solid there is.
@@ -82,7 +83,7 @@ pub(super) fn bake(wires: &Wires, linear: DMat3, widths: &Widths) -> Baked {
 
 /// Wires that one thread makes at a time, and those whose solids are kept beside the mesh that they belong to.
 const PART: usize = 1 << 12;
-const BATCH: usize = 1 << 18;
+const BATCH: usize = 1 << 15;
 
 /// Adds a mesh whose triangles count its own vertices.
 #[expect(clippy::cast_possible_truncation, reason = "runs are short enough")]

@@ -196,7 +196,9 @@ struct Drawing<'a> {
 impl Drawing<'_> {
     /// Makes the solids of wires that are turned and stretched by `linear`: meshes, and where they stand.
     fn bake(&mut self, wires: &Wires, linear: DMat3) -> Result<Vec<Part>, OverBudget> {
-        self.budget.take(bake::cost(wires, &self.widths), 1)?;
+        let [kept, held] = bake::cost(wires, &self.widths);
+        self.budget.take(kept, 1)?;
+        self.budget.clone().take(held, 1)?;
         let material = self.material(wires);
         let Baked { meshes, center, dropped } = bake::bake(wires, linear, &self.widths);
         self.dropped += dropped;
