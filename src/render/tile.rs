@@ -17,6 +17,7 @@ use super::{Progress, Settings, adaptive, stochastic};
 use crate::accel::Accel;
 use crate::image::{Channel, Layers, Picture, Values};
 use crate::stopwatch::{Spent, Stopwatch};
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -25,7 +26,7 @@ use std::time::Duration;
 pub(super) const TILE: u32 = 32;
 
 /// Columns and rows of a block of pixels, whose rays go together.
-const BLOCK: u32 = 4;
+pub(super) const BLOCK: u32 = 4;
 
 /// Samples that are traced together at most: few enough that they and their rays stay in a processor's own cache.
 pub(super) const TOGETHER: usize = 1 << 11;
@@ -180,12 +181,7 @@ impl Whole {
                     veil.copy_from_slice(&pixels.veil[own.clone()]);
                 }
                 if let Some(facts) = pixels.facts.get(own.clone()) {
-                    for (count, facts) in sampled.counts[to.clone()].iter_mut().zip(facts) {
-                        *count = facts.count;
-                    }
-                    for (error, facts) in sampled.errors.get_mut(to).into_iter().flatten().zip(facts) {
-                        *error = facts.error;
-                    }
+                    sampled.keep(to, facts);
                 }
                 if let Some(layers) = &mut picture.layers {
                     (start..).zip(&pixels.layers[own]).for_each(|(i, pixel)| pixel.store(layers, i));
@@ -193,11 +189,24 @@ impl Whole {
                 from += count;
             }
         }
-        for facts in &pixels.facts {
-            sampled.met += u64::from(facts.end == End::Met);
-            sampled.at_most += u64::from(facts.end == End::Ceiling);
-            sampled.spare += u64::from(facts.spare);
+    }
+}
+
+impl Sampled {
+    /// Keeps how the sampling of pixels that follow each other went, in the places of this range.
+    #[inline(always)]
+    fn keep(&mut self, to: Range<usize>, facts: &[PixelFacts]) {
+        let (mut met, mut at_most, mut spare) = (0, 0, 0);
+        for (count, facts) in self.counts[to.clone()].iter_mut().zip(facts) {
+            *count = facts.count;
+            met += u64::from(facts.end == End::Met);
+            at_most += u64::from(facts.end == End::Ceiling);
+            spare += u64::from(facts.spare);
         }
+        if let Some(errors) = self.errors.get_mut(to) {
+            errors.iter_mut().zip(facts).for_each(|(error, facts)| *error = facts.error);
+        }
+        (self.met, self.at_most, self.spare) = (self.met + met, self.at_most + at_most, self.spare + spare);
     }
 }
 

@@ -5,12 +5,6 @@ use crate::math::Vec4;
 use crate::math::simd::{Kernel, Simd};
 use std::ops::Range as Run;
 
-/// Pixels of a row that are compared together at most: those of a tile and a few around it …
-const PART: usize = 46;
-
-/// … with one more on each side.
-const WIDE: usize = PART + 2;
-
 /// What nine numbers lie between is so many times their standard deviation (L. H. C. Tippett, "On the Extreme Individuals and
 /// the Range of Samples Taken from a Normal Population", 1925).
 const RANGE: f32 = 2.970;
@@ -34,9 +28,9 @@ impl Shown {
         Self { colors: std::array::from_fn(|_| Vec::with_capacity(count)), brightest: Vec::with_capacity(count) }
     }
 
-    /// Whether anything is known of a place.
-    pub(in crate::render) fn is_known(&self, i: usize) -> bool {
-        !self.colors[0][i].is_nan()
+    /// One number of each place, which is not one where nothing is known.
+    pub(in crate::render) fn known(&self) -> &[f32] {
+        &self.colors[0]
     }
 
     /// What is shown at a place.
@@ -75,83 +69,73 @@ impl Even {
         self.is_uneven[i] == 0
     }
 
-    /// Standard error of the pixel at a place.
-    pub(in crate::render) fn error(&self, i: usize) -> f32 {
-        self.errors[i]
+    /// The same of all at these places.
+    pub(in crate::render) fn are_even(&self, places: Run<usize>) -> bool {
+        self.is_uneven[places].iter().fold(0, |any, uneven| any | uneven) == 0
+    }
+
+    /// Standard errors of the pixels at so many places from one on.
+    pub(in crate::render) fn errors(&self, start: usize, count: usize) -> &[f32] {
+        &self.errors[start..start + count]
     }
 }
 
 impl Certainty<'_> {
-    /// Compares single samples with those beside them. They lie row by row, each with so many `columns`; `runs` are places in
-    /// rows, around which there is at least one more place on every side.
-    pub(in crate::render) fn compare(
-        &self,
-        shown: &Shown,
-        columns: usize,
-        runs: impl Iterator<Item = Run<usize>>,
-    ) -> Even {
+    /// Compares single samples of places that follow each other with those beside them. They lie row by row, each with so many
+    /// `columns`; there must be at least one more row on either side, and one more place.
+    pub(in crate::render) fn compare(&self, shown: &Shown, columns: usize, places: Run<usize>) -> Even {
         let count = shown.brightest.len();
         let mut even = Even { is_uneven: vec![0; count], errors: vec![0.0; count] };
-        self.level.run(Compare { judge: self, shown, columns, runs, even: &mut even });
+        self.level.run(Compare { judge: self, shown, columns, places, even: &mut even });
         even
     }
 }
 
-struct Compare<'a, 'j, R> {
+struct Compare<'a, 'j> {
     judge: &'a Certainty<'j>,
     shown: &'a Shown,
     columns: usize,
-    runs: R,
+    places: Run<usize>,
     even: &'a mut Even,
 }
 
-impl<R: Iterator<Item = Run<usize>>> Kernel for Compare<'_, '_, R> {
+impl Kernel for Compare<'_, '_> {
     type Output = ();
 
     #[inline(always)]
+    #[expect(clippy::cast_precision_loss, reason = "a handful of channels")]
     fn run<S: Simd>(self, _: S) {
-        let Self { judge, shown, columns, runs, even } = self;
-        for run in runs {
-            let mut start = run.start;
-            while start < run.end {
-                let count = PART.min(run.end - start);
-                let (differs, errors) = judge.beside(shown, columns, start);
-                even.is_uneven[start..start + count].copy_from_slice(&differs[..count]);
-                even.errors[start..start + count].copy_from_slice(&errors[..count]);
-                start += count;
-            }
+        let Self { judge, shown, columns, places, even } = self;
+        let (limit, channels) = (Certainty::steep(1) * judge.error, judge.channels());
+        let (uneven, errors) = (&mut even.is_uneven[places.clone()], &mut even.errors[places.clone()]);
+        // Alpha is the same everywhere where it is not written.
+        for column in &shown.colors[..channels] {
+            let rows = [places.start - columns, places.start, places.start + columns];
+            differ(rows.map(|at| &column[at - 1..=at + places.len()]), limit, (&mut *uneven, &mut *errors));
+        }
+        for error in errors {
+            *error = (*error / channels as f32).sqrt() / RANGE;
         }
     }
 }
 
-impl Certainty<'_> {
-    /// Of places from one on: whether any beside it looks different, and the standard error of its pixel.
-    #[inline(always)]
-    #[expect(clippy::cast_precision_loss, reason = "a handful of channels")]
-    fn beside(&self, shown: &Shown, columns: usize, start: usize) -> ([u32; WIDE], [f32; WIDE]) {
-        let (limit, channels) = (Self::steep(1) * self.error, self.channels());
-        let (mut differs, mut errors) = ([0; WIDE], [0.0; WIDE]);
-        // Alpha is the same everywhere where it is not written.
-        for column in &shown.colors[..channels] {
-            let [above, own, below] = [start - columns, start, start + columns].map(|at| some(column, at - 1));
-            // Of three above each other, and then of three such: room for two more behind.
-            let (mut low, mut high) = ([f32::INFINITY; WIDE + 2], [f32::NEG_INFINITY; WIDE + 2]);
-            for i in 0..WIDE {
-                low[i] = least(least(least(f32::INFINITY, above[i]), own[i]), below[i]);
-                high[i] = most(most(most(f32::NEG_INFINITY, above[i]), own[i]), below[i]);
-            }
-            for i in 0..WIDE {
-                let own = if i + 1 < WIDE { own[i + 1] } else { 0.0 };
-                let least = least(least(low[i], low[i + 1]), low[i + 2]);
-                let most = most(most(high[i], high[i + 1]), high[i + 2]);
-                differs[i] |= u32::from(most - own > limit) | u32::from(own - least > limit);
-                errors[i] += (most - least) * (most - least);
+/// Notes of places that follow each other where one of the nine at and around them is farther than the limit from the one in the
+/// middle, and adds the square of what they lie between; `rows` begin one place before and end one behind.
+#[inline(always)]
+fn differ([above, own, below]: [&[f32]; 3], limit: f32, (uneven, errors): (&mut [u32], &mut [f32])) {
+    let count = own.len().saturating_sub(2).min(uneven.len()).min(errors.len());
+    // Of known lengths, so that nothing is asked within the loop.
+    let [above, own, below] = [above, own, below].map(|row| &row[..count + 2]);
+    let (uneven, errors) = (&mut uneven[..count], &mut errors[..count]);
+    for i in 0..count {
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        for row in [above, own, below] {
+            for number in [row[i], row[i + 1], row[i + 2]] {
+                (low, high) = (least(low, number), most(high, number));
             }
         }
-        for error in &mut errors {
-            *error = (*error / channels as f32).sqrt() / RANGE;
-        }
-        (differs, errors)
+        uneven[i] |= u32::from(high - own[i + 1] > limit) | u32::from(own[i + 1] - low > limit);
+        errors[i] += (high - low) * (high - low);
     }
 }
 
@@ -165,19 +149,6 @@ fn least(a: f32, b: f32) -> f32 {
 #[inline(always)]
 fn most(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
-}
-
-/// Numbers from a place on, as far as there are.
-#[inline(always)]
-fn some(column: &[f32], start: usize) -> [f32; WIDE] {
-    match column[start..].first_chunk() {
-        Some(whole) => *whole,
-        None => {
-            let mut part = [f32::NAN; WIDE];
-            part[..column.len() - start].copy_from_slice(&column[start..]);
-            part
-        }
-    }
 }
 
 #[cfg(test)]
@@ -214,8 +185,8 @@ mod tests {
                 assert_eq!(pixels.beauty, resolved);
                 let mut seen = Vec::new();
                 judge.see_each(groups.iter().map(|group| &group[..]), |one| seen.push(*one));
-                let even =
-                    judge.compare(&shown, columns, (1..rows - 1).map(|row| row * columns + 1..(row + 1) * columns - 1));
+                let inner = columns + 1..(rows - 1) * columns - 1;
+                let even = judge.compare(&shown, columns, inner);
                 let (mut evens, mut all) = (0, 0);
                 for at in (1..rows - 1).flat_map(|row| row * columns + 1..(row + 1) * columns - 1) {
                     assert_eq!(
@@ -231,7 +202,7 @@ mod tests {
                         "{at}"
                     );
                     let range = near().fold(Range::NOTHING, |all, seen| all.with(seen.range));
-                    assert_eq!(even.error(at), judge.contrast(&range) / RANGE, "{at}");
+                    assert_eq!(even.errors(at, 1), [judge.contrast(&range) / RANGE], "{at}");
                     (evens, all) = (evens + usize::from(even.is_even(at)), all + 1);
                 }
                 assert!(evens > all / 10 && evens < all * 9 / 10, "{evens} of {all}");

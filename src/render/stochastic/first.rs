@@ -9,7 +9,7 @@ use crate::render::certainty::{Pixels, Shown};
 use crate::render::frame::Frame;
 use crate::render::layers::{FirstSurface, LayerPixel};
 use crate::render::observer::Observer;
-use crate::render::tile::{TOGETHER, Tile, TilePixels};
+use crate::render::tile::{BLOCK, TOGETHER, Tile, TilePixels};
 use crate::render::whitted::{Sample, Tracer};
 
 /// One sample of every pixel of some parts of the picture: part after part, and each in the order of its places.
@@ -102,12 +102,17 @@ impl First {
 /// Copies a rectangle of numbers between arrays with so many to a row.
 #[inline(always)]
 fn copy((to, to_step): (&mut [f32], usize), (from, from_step): (&[f32], usize), [width, height]: [usize; 2]) {
-    for row in 0..height {
-        let (to, from) = (&mut to[row * to_step..][..width], &from[row * from_step..][..width]);
-        // The usual width, without a call.
-        match (<&mut [f32; 4]>::try_from(&mut *to), <&[f32; 4]>::try_from(from)) {
-            (Ok(to), Ok(from)) => *to = *from,
-            _ => to.copy_from_slice(from),
+    /// Columns and rows of a whole block.
+    const SIDE: usize = BLOCK as usize;
+    // The usual size, without a call.
+    if let ([SIDE, SIDE], SIDE, Some(from)) = ([width, height], from_step, from.first_chunk::<{ SIDE * SIDE }>()) {
+        for (row, from) in from.as_chunks::<SIDE>().0.iter().enumerate() {
+            let start = row * to_step;
+            to[start..start + SIDE].copy_from_slice(from);
         }
+        return;
+    }
+    for row in 0..height {
+        to[row * to_step..][..width].copy_from_slice(&from[row * from_step..][..width]);
     }
 }

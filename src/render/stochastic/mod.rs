@@ -187,7 +187,11 @@ impl<'a> Sampler<'a> {
         // Block by block, as rays of pixels near each other run alike.
         for block in known.blocks() {
             for y in block.y0..block.y1 {
-                for (x, at) in (block.x0..block.x1).zip(around.at((block.x0, y))..) {
+                let start = around.at((block.x0, y));
+                if even.are_even(start..start + (block.x1 - block.x0) as usize) {
+                    continue;
+                }
+                for (x, at) in (block.x0..block.x1).zip(start..) {
                     if !even.is_even(at) {
                         around.know((x, y), pixels.len());
                         pixels.push(self.opened(first, (x, y)));
@@ -195,18 +199,15 @@ impl<'a> Sampler<'a> {
                 }
             }
         }
-        let tile = done.tile;
-        done.facts.clear();
+        let (tile, mut from) = (done.tile, 0);
         for block in tile.blocks() {
+            let columns = (block.x1 - block.x0) as usize;
             for y in block.y0..block.y1 {
-                let start = around.at((block.x0, y));
-                let own = start..start + (block.x1 - block.x0) as usize;
-                done.facts.extend(own.map(|at| PixelFacts {
-                    count: 1,
-                    spare: 0,
-                    error: even.error(at),
-                    end: End::Met,
-                }));
+                let errors = even.errors(around.at((block.x0, y)), columns);
+                for (facts, &error) in done.facts[from..from + columns].iter_mut().zip(errors) {
+                    *facts = PixelFacts { count: 1, spare: 0, error, end: End::Met };
+                }
+                from += columns;
             }
         }
         first.iter().for_each(|first| first.put(self.frame, done));

@@ -7,9 +7,15 @@ pub(super) struct Variances {
 }
 
 impl Variances {
-    /// Of as many places, so many in a row, nothing yet.
-    pub(super) fn nothing(columns: usize, places: usize) -> Self {
-        Self { columns, each: vec![f32::NAN; places] }
+    /// Of places so many in a row, nothing yet.
+    pub(super) fn nothing(columns: usize) -> Self {
+        Self { columns, each: Vec::new() }
+    }
+
+    /// Begins with those of single samples, which do not vary; of each place a number, which is not one where there is none.
+    pub(super) fn begin(&mut self, samples: &[f32]) {
+        self.each.clear();
+        self.each.extend(samples.iter().map(|sample| if sample.is_nan() { f32::NAN } else { 0.0 }));
     }
 
     /// Learns that of a place.
@@ -73,7 +79,8 @@ mod tests {
 
     /// Of the middle of nine places.
     fn no_less_than(own: f32, beside: [f32; 8]) -> f32 {
-        let mut variances = Variances::nothing(3, 9);
+        let mut variances = Variances::nothing(3);
+        variances.begin(&[f32::NAN; 9]);
         for (at, variance) in [0, 1, 2, 3, 5, 6, 7, 8].into_iter().zip(beside) {
             variances.learn(at, variance);
         }
