@@ -205,7 +205,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             if !hit.is_some() {
                 if path.straight { self.leave(ray, path) } else { self.beside.missed.push(index) }
             } else if self.is_crossed(wave, i) {
-                self.continuing[class as usize].push(*ray, *path, *hit);
+                self.continuing[class as usize].push_behind(*ray, *path, *hit);
             } else if rays.len() < FEW || !sorted.take(context, (index, 1), hit.prim) {
                 self.shade_one(traced, i);
             }
@@ -220,7 +220,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let face = |prim| self.context.face(prim);
         match wave.starts {
             true => wave.touches(i) && is_same_surface(face, ray, before, hit),
-            false => is_same_crossing(face, ray, before, hit),
+            false => !wave.paths[i].behind_hole && is_same_crossing(face, ray, before, hit),
         }
     }
 
@@ -333,11 +333,16 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     fn pass(&mut self, traced: Traced, at: usize, passed: Passed) {
         let (context, class) = (self.context, traced.class());
         let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
-        let absorbs = context.absorption.is_some();
-        let path = if absorbs { context.absorption.lessened(ray, &path, hit) } else { path };
+        let lessened = |path| match context.absorption.is_some() {
+            true => context.absorption.lessened(ray, &path, hit),
+            false => path,
+        };
         match passed {
-            Passed::Back => self.continuing[class as usize].push(*ray, path, *hit),
-            Passed::Covered(covered) => self.go_on(class, ray, &path, hit, covered),
+            Passed::Back => self.continuing[class as usize].push_behind(*ray, lessened(path), *hit),
+            Passed::Covered(covered) if covered <= 0.0 => {
+                self.continuing[class as usize].push_through(*ray, path, *hit);
+            }
+            Passed::Covered(covered) => self.go_on(ray, &lessened(path), hit, covered),
         }
     }
 

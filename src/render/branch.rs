@@ -314,7 +314,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             if !self.goes_on(point, &mut path) {
                 return;
             }
-            return self.continuing[RayClass::Refracted as usize].push(*point.ray, path, *point.hit);
+            return self.continuing[RayClass::Refracted as usize].push_behind(*point.ray, path, *point.hit);
         }
         let Seen { normal, geometric, view, .. } = point.surface.seen();
         let (n_i, n_t) = (f64::from(crossing.n_i), f64::from(crossing.n_t));

@@ -35,6 +35,8 @@ pub(crate) struct Path {
     pub depth: u32,
     /// Whether the ray still runs along the line of sight, so that what lies behind shows through.
     pub straight: bool,
+    /// Of a ray that goes on behind a hit, whether nothing was there: then it has crossed nothing.
+    pub behind_hole: bool,
     /// The part of the spectrum this ray carries, once dispersion has split it.
     pub band: Option<u8>,
     /// What the ray is inside of.
@@ -59,6 +61,7 @@ impl Path {
             part: 1.0,
             depth: 0,
             straight: true,
+            behind_hole: false,
             band: None,
             media,
             since: 0.0,
@@ -182,6 +185,16 @@ impl Queue {
         self.after.push(after);
     }
 
+    /// Adds a ray that goes on behind a hit, where something was.
+    pub(crate) fn push_behind(&mut self, ray: Ray, path: Path, hit: Hit) {
+        self.push(ray, Path { behind_hole: false, ..path }, hit);
+    }
+
+    /// The same where nothing was.
+    pub(crate) fn push_through(&mut self, ray: Ray, path: Path, hit: Hit) {
+        self.push(ray, Path { behind_hole: true, ..path }, hit);
+    }
+
     /// Moves the last rays, at most `limit`, into `wave`.
     ///
     /// Taking from the end bounds the memory that trees with many branches need: a slice is traced down to its leaves
@@ -257,6 +270,9 @@ impl Wave {
         }
         if self.starts {
             return hit.t <= before.t;
+        }
+        if self.paths[i].behind_hole {
+            return false;
         }
         hit.t - before.t <= NEAR * (hit.t + ray.origin.abs().max_element())
     }

@@ -214,7 +214,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     pub(super) fn shade(&mut self, class: RayClass, (ray, hit, touches): (&Ray, &Hit, bool), path: &Path) {
         let context = self.context;
         let lessened = context.absorption.is_some().then(|| context.absorption.lessened(ray, path, hit));
-        let path = lessened.as_ref().unwrap_or(path);
+        let (before, path) = (path, lessened.as_ref().unwrap_or(path));
         let target = Target::new(context.scene, context.world, hit.prim);
         let material = target.material;
         let width = path.cone_width + path.cone_spread * hit.t;
@@ -222,16 +222,16 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
 
         // Pass what is not there: backs of one-sided faces, absent texels, and part of what is blended.
         if !surface.front && !material.double_sided && !material.reflection.transmits() {
-            return self.continuing[class as usize].push(*ray, *path, *hit);
+            return self.continuing[class as usize].push_behind(*ray, *path, *hit);
         }
         let reader = Reader { store: context.textures, patch: surface.patch.as_ref(), known: &[] };
         let base = reader.base(material);
         let covered = coverage(material, base.w);
-        if covered < 1.0 {
-            self.go_on(class, ray, path, hit, covered);
-        }
         if covered <= 0.0 {
-            return;
+            return self.continuing[class as usize].push_through(*ray, *before, *hit);
+        }
+        if covered < 1.0 {
+            self.go_on(ray, path, hit, covered);
         }
 
         // Local colour: emitted, from everywhere, from each light.
@@ -296,14 +296,13 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// Goes on behind a surface that covers only a part.
-    pub(super) fn go_on(&mut self, class: RayClass, ray: &Ray, path: &Path, hit: &Hit, covered: f32) {
+    /// Goes on behind a surface that covers a part.
+    pub(super) fn go_on(&mut self, ray: &Ray, path: &Path, hit: &Hit, covered: f32) {
         let weight = path.weight * (1.0 - covered);
-        let class = if covered > 0.0 { RayClass::Refracted } else { class };
         if self.context.is_alive(weight, path.part) {
-            let mut path = Path { weight, ..path.turned(class, ON) };
+            let mut path = Path { weight, ..path.turned(RayClass::Refracted, ON) };
             if self.roulette.spin(&self.streams, ray.sample, &mut path) {
-                self.continuing[class as usize].push(*ray, path, *hit);
+                self.continuing[RayClass::Refracted as usize].push_behind(*ray, path, *hit);
             }
         }
     }

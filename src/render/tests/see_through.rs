@@ -72,6 +72,38 @@ fn a_face_with_the_corners_of_one_that_is_not_there_is_seen() {
     }
 }
 
+/// A square with a hole all over it, and in the same place, of the same mesh, one without: what a texel says decides, not whose
+/// corners it has.
+#[test]
+fn behind_a_hole_a_face_of_the_same_surface_in_the_same_place_is_seen() {
+    let mut s = looking_down(9.0);
+    s.scene.bitmaps.push(Bitmap {
+        name: String::new(),
+        width: 2,
+        height: 1,
+        pixels: Pixels::Rgba8(vec![[255, 0, 0, 0], [0, 255, 0, 255]].into()),
+    });
+    s.scene.textures.push(Texture {
+        bitmap: 0,
+        sampler: Sampler { magnify: Filter::Nearest, minify: Filter::Nearest, ..Sampler::default() },
+    });
+    let map = TextureRef { texture: 0, uv_set: 0, transform: UvTransform::default() };
+    let mut mesh = square(0.0, 1.0);
+    let corners = mesh.positions.len() as u32;
+    mesh.positions.extend_from_within(..);
+    mesh.triangles.extend(mesh.triangles.clone().iter().map(|t| t.map(|corner| corner + corners)));
+    // Of the first face the texel that is not there, of the second the other.
+    mesh.uvs = vec![(0..2 * corners).map(|i| Vec2::new(if i < corners { 0.25 } else { 0.75 }, 0.5)).collect()];
+    let leaf = Material {
+        alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
+        base_color_map: Some(map),
+        double_sided: true,
+        ..unlit(Vec3::ONE)
+    };
+    s.mesh(mesh, DAffine3::IDENTITY, leaf).square(-1.0, 1.0, unlit(Vec3::Z));
+    assert_eq!((s.color(), s.alpha()), (Vec3::Y, 1.0));
+}
+
 #[test]
 fn shadows_are_those_of_all_that_lies_in_one_place() {
     let clear = blended(Vec3::ZERO, 0.0);
