@@ -99,6 +99,13 @@ fn files<'a>(shots: impl Iterator<Item = &'a Shot>, beside: Beside) -> Vec<PathB
     shots.flat_map(|shot| of(shot, beside)).filter_map(|target| target.path().map(Path::to_path_buf)).collect()
 }
 
+/// The folder of a file, if it is one that may be made for pictures.
+pub(super) fn grows_with<'a>(batches: &'a [Batch], file: &Path) -> Option<&'a Path> {
+    let folder = lexical(file.parent()?);
+    let mut growths = batches.iter().flat_map(|batch| &batch.shots).filter_map(|shot| shot.growth.as_deref());
+    growths.find(|growth| lexical(growth) == folder)
+}
+
 /// Makes the folder of a picture, if it is one that may be made.
 pub(super) fn make_folder(shot: &Shot) -> Result<(), Diagnostic> {
     let folder = shot.growth.as_ref().and_then(|_| shot.target.path()?.parent());

@@ -37,10 +37,12 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
     let mut so_far = SoFar::new(sources);
     // A picture that is repeated may be replaced by its repetition, but by nothing else.
     let spared = |path| Sources::of(&job.again).spared_by(path, "--stats-file");
-    if let Some(path) = job.stats_file()
-        && let Err(fault) = writable::check(path, "--stats-file", &so_far.sources).and_then(|()| spared(path))
-    {
-        return messages.fail(&fault, Exit::Failed);
+    if let Some(path) = job.stats_file() {
+        let growth = outputs::grows_with(&job.batches, path);
+        let checked = writable::check_in(path, "--stats-file", growth, &so_far.sources);
+        if let Err(fault) = checked.and_then(|()| spared(path)) {
+            return messages.fail(&fault, Exit::Failed);
+        }
     }
     let lanes::Ended { worst, failed } = lanes::run(job, &pool, messages, &mut so_far);
     if interrupt::raised() {

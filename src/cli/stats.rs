@@ -29,13 +29,13 @@ use super::interrupt;
 use super::job::RenderJob;
 use super::message::Messages;
 use super::profile::Profile;
-use super::{sampling, summary};
+use super::{outputs, sampling, summary};
 use crate::accel::{AccelKind, AccelParams, RayCounts, StructureStats};
 use crate::number::{bytes, grouped, seconds, so_many};
 use crate::render::{CLASS_NAMES, ClassCounts, Job, Progress, Rendered, Sampling, World};
 use serde_json::{Value, json};
-use std::io;
 use std::time::Instant;
+use std::{fs, io};
 
 /// Seconds of the stages.
 #[derive(Clone, Copy, Debug, Default)]
@@ -284,8 +284,12 @@ pub(super) fn text(job: &RenderJob, pictures: &[PictureStats]) -> String {
 pub(super) fn report(job: &RenderJob, text: &str, messages: &Messages) -> Exit {
     let result = match job.stats_file() {
         None => super::print(text),
-        Some(path) => interrupt::write_atomic(path, text.as_bytes())
-            .map_err(|e| io::Error::new(e.kind(), format!("{}: {e}", path.display()))),
+        Some(path) => {
+            // No picture may have made it.
+            let made = outputs::grows_with(&job.batches, path).map_or(Ok(()), fs::create_dir_all);
+            made.and_then(|()| interrupt::write_atomic(path, text.as_bytes()))
+                .map_err(|e| io::Error::new(e.kind(), format!("{}: {e}", path.display())))
+        }
     };
     match result {
         Ok(()) => Exit::Done,

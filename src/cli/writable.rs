@@ -74,9 +74,17 @@ pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Di
     sources.spared_by(path, flag)
 }
 
+/// [`check`], where `growth`, if there is one, and folders below it are made, and need not be there; what that lies in must.
+pub(super) fn check_in(path: &Path, flag: &str, growth: Option<&Path>, sources: &Sources) -> Result<(), Diagnostic> {
+    match check(path, flag, sources) {
+        Err(fault) if fault.code == NO_FOLDER && growth.is_some_and(can_be) => Ok(()),
+        checked => checked,
+    }
+}
+
 /// Whether a picture may go there: to a pipe or a file behind standard output, or under a name that it may replace.
 ///
-/// `growth` and folders below it are made, and need not be there; what that lies in must.
+/// `growth` is as [`check_in`] has it.
 pub(super) fn check_target(target: &Target, growth: Option<&Path>, sources: &Sources) -> Result<(), Diagnostic> {
     let Some(path) = target.path() else {
         use std::io::IsTerminal;
@@ -84,10 +92,7 @@ pub(super) fn check_target(target: &Target, growth: Option<&Path>, sources: &Sou
         let fault = Diagnostic::new("output-terminal", "", "", text).remedy("redirect it, or name a file with -o");
         return if std::io::stdout().is_terminal() { Err(fault) } else { Ok(()) };
     };
-    match check(path, "-o", sources) {
-        Err(fault) if fault.code == NO_FOLDER && growth.is_some_and(can_be) => return Ok(()),
-        checked => checked?,
-    }
+    check_in(path, "-o", growth, sources)?;
     if matches!(target, Target::Default(_)) && path.exists() && !was_written_by_meshray(path) {
         let fault = Diagnostic::new("output-not-ours", path, "", "exists and is no picture that meshray wrote");
         return Err(fault.remedy("move it away, or name another output with -o"));

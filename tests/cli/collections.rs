@@ -43,6 +43,19 @@ fn the_folder_that_is_named_is_made_where_the_one_around_it_is_there() {
 }
 
 #[test]
+fn statistics_go_into_the_folder_that_is_made_for_pictures_and_into_no_other() {
+    let folder = collection();
+    let stats = |file: &'static str| ["all", "-o", "new/", "--stats", "json", "--stats-file", file];
+    folder.render(&stats("gone/stats.json")).ends(1).says(&["its folder is not there", "--stats-file"]);
+    folder.render(&stats("new/deep/stats.json")).ends(1).says(&["its folder is not there", "--stats-file"]);
+    assert!(!folder.has("new"), "nothing is done before");
+    folder.render(&stats("./new/stats.json")).ends(0);
+    assert!(folder.has("new/a.png") && folder.has("new/stats.json"));
+    folder.render(&["all", "-o", "plan/", "--dry-run", "--stats-file", "plan/plan.txt"]).ends(0);
+    assert!(folder.has("plan/plan.txt"), "no picture has made it");
+}
+
+#[test]
 fn folders_are_made_only_in_one_that_is_there_and_for_pictures_that_are() {
     let folder = collection().file("all/deep/broken/c.glb", "glTF").file("thumbs/er", "a file");
     folder.render(&["all/deep", "-o", "thumbs/"]).ends(3).says(&["1 picture of 3 inputs, 2 of them failed", "er"]);
