@@ -328,14 +328,18 @@ fn prepare(
     }
     profile.loaded(loaded.facts.reading, loaded.facts.decoding);
     // What is wrong with one frame is wrong with most, in other numbers.
-    for warning in &loaded.warnings {
-        if told.insert(kind_of(warning)) || !is_later {
-            messages.say(Severity::Warning, warning);
+    let mut warn = |warnings: &[Diagnostic]| {
+        for warning in warnings {
+            if told.insert(kind_of(warning)) || !is_later {
+                messages.say(Severity::Warning, warning);
+            }
         }
-    }
-    if job.strict && !loaded.warnings.is_empty() {
-        return Err(task.fail(&read::not_strict(loaded.warnings.len(), task.file()), Exit::Input));
-    }
+        match warnings.len() {
+            count if job.strict && count > 0 => Err(task.fail(&read::not_strict(count, task.file()), Exit::Input)),
+            _ => Ok(()),
+        }
+    };
+    warn(&loaded.warnings)?;
     if let Some(expected) = &job.expected_hash {
         again::check_hash(expected, &loaded, &batch.inputs, &job.look)
             .map_err(|fault| task.fail(&fault, Exit::Input))?;
@@ -346,13 +350,7 @@ fn prepare(
     if world.is_empty() && !job.allow_empty && survey.is_none() {
         return Err(task.fail(&nothing_to_draw(&loaded, &batch.inputs[0]), Exit::Input));
     }
-    let coarse = coarse(&loaded, &world, &batch.inputs[0]);
-    for warning in coarse.iter().filter(|w| told.insert(kind_of(w)) || !is_later) {
-        messages.say(Severity::Warning, warning);
-    }
-    if job.strict && coarse.is_some() {
-        return Err(task.fail(&read::not_strict(1, task.file()), Exit::Input));
-    }
+    warn(coarse(&loaded, &world, &batch.inputs[0]).as_slice())?;
     profile.done("place");
     let bounds = robust_bounds_within(&loaded.scene, world.bounds);
     profile.done("frame");

@@ -65,18 +65,8 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
     let meta = if format == ImageFormat::OpenExr { MetaData::read_from_buffered(bytes, false).ok() } else { None };
     let luminance = meta.as_ref().and_then(of_luminance);
     let size = luminance.map_or_else(|| reader(limits.memory).into_dimensions(), |part| Ok(size_of(part)));
-    let (width, height) = size.map_err(|e| fault(format!("cannot be decoded: {e}")))?;
-    let pixels = u64::from(width) * u64::from(height);
-    if pixels == 0 || pixels > limits.image_pixels {
-        let text = format!("is {width}×{height} pixels where 1 to {} are allowed", limits.image_pixels);
-        // Less memory allows less pixels.
-        let fits = (1..=Limits::default().image_pixels).contains(&pixels);
-        return Err(if fits { Diagnostic::over_memory(&source.path, "", text).into() } else { fault(text) });
-    }
-    Budget::new(limits)
-        .take(pixels, PER_PIXEL)
-        .map_err(|over| LoadError::from(Diagnostic::over_memory(&source.path, "", over.to_string())))?;
-    let most = pixels * PER_PIXEL;
+    let size = size.map_err(|e| fault(format!("cannot be decoded: {e}")))?;
+    let most = memory_of(size, limits, &source.path, fault)?;
     let decode = || if luminance.is_some() { grey(bytes) } else { upright(reader(most)) };
     // The decoder of EXR files gives up on some damaged ones by a panic.
     let picture = match attempt(|| threads::anywhere(decode)) {
@@ -98,18 +88,49 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
     {
         texels.iter_mut().flatten().for_each(|c| *c /= exposure);
     }
-    if let Some(parts) = meta.map(|meta| meta.headers.len()).filter(|&parts| parts > 1) {
+    let parts = meta.map_or(1, |meta| meta.headers.len());
+    warnings.extend(left_out(&source.path, parts, odd));
+    let name = source.path.to_string_lossy().into_owned();
+    let panorama = Panorama { name, width, height, texels: Arc::new(texels), rotation: 0.0 };
+    Ok(LoadedPanorama { panorama, warnings, hash: xxh3_128(&source.bytes) })
+}
+
+/// Bytes that a panorama of so many columns and rows may take while it is loaded.
+///
+/// # Errors
+/// Where it has no pixels, or more than `limits` allow, of which memory is told apart; what else is wrong is a `fault`.
+fn memory_of(
+    (width, height): (u32, u32),
+    limits: &Limits,
+    path: &Path,
+    fault: impl Fn(String) -> LoadError,
+) -> Result<u64, LoadError> {
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels == 0 || pixels > limits.image_pixels {
+        let text = format!("is {width}×{height} pixels where 1 to {} are allowed", limits.image_pixels);
+        // Less memory allows less pixels.
+        let fits = (1..=Limits::default().image_pixels).contains(&pixels);
+        return Err(if fits { Diagnostic::over_memory(path, "", text).into() } else { fault(text) });
+    }
+    Budget::new(limits)
+        .take(pixels, PER_PIXEL)
+        .map_err(|over| LoadError::from(Diagnostic::over_memory(path, "", over.to_string())))?;
+    Ok(pixels * PER_PIXEL)
+}
+
+/// Warnings of all but one of so many parts, and of pixels that are taken as 0.
+fn left_out(path: &Path, parts: usize, odd: usize) -> Vec<Diagnostic> {
+    let mut warnings = Vec::new();
+    if parts > 1 {
         let text = format!("has {parts} parts, of which one is shown");
-        warnings.push(Diagnostic::new("env-parts", &source.path, "", text).remedy("keep only the panorama in it"));
+        warnings.push(Diagnostic::new("env-parts", path, "", text).remedy("keep only the panorama in it"));
     }
     if odd > 0 {
         let pixels = if odd == 1 { "1 pixel has".into() } else { format!("{odd} pixels have") };
         let text = format!("{pixels} numbers that are negative or not finite, which are taken as 0");
-        warnings.push(Diagnostic::new("env-pixels", &source.path, "", text));
+        warnings.push(Diagnostic::new("env-pixels", path, "", text));
     }
-    let name = source.path.to_string_lossy().into_owned();
-    let panorama = Panorama { name, width, height, texels: Arc::new(texels), rotation: 0.0 };
-    Ok(LoadedPanorama { panorama, warnings, hash: xxh3_128(&source.bytes) })
+    warnings
 }
 
 /// A Radiance picture as its decoder knows it: the first line of one names the program that wrote it, mostly `#?RADIANCE` or

@@ -237,23 +237,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         // Local colour: emitted, from everywhere, from each light.
         surface.shade_smoothly(context.textures);
         self.note(ray, path, &surface, base.truncate());
-        let mut matter = Matter::new(&surface, base.truncate(), context.textures);
-        if path.scattered > SPREAD {
-            matter.blur(path.scattered);
-        }
-        if !context.lights.is_empty() {
-            let least = |map| glint::least_square(&surface, map, context, path.cone_spread);
-            if matter.has_narrow_highlight() {
-                matter.widen_highlight(least((material.normal_map.as_ref(), material.normal_scale)));
-            }
-            if let Some(coat) = matter.coat.as_mut().filter(|coat| coat.has_narrow_highlight()) {
-                let of_coat = material.metal_rough().and_then(|m| m.coat.as_ref());
-                coat.widen_highlight(least(of_coat.map_or((None, 1.0), |c| (c.normal_map.as_ref(), c.normal_scale))));
-            }
-        }
-        if path.depth < context.depth && context.gloss.spreads(material) {
-            matter.spread_by_rays();
-        }
+        let matter = matter_seen(context, &surface, base.truncate(), path);
         let point = Point {
             ray,
             hit,
@@ -391,4 +375,27 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             self.shadows.push_feelers(&feelers, radiance, inside);
         }
     }
+}
+
+/// What a surface of this base colour is made of, as a ray of a path sees it.
+fn matter_seen(context: &Context, surface: &Surface, base: Vec3, path: &Path) -> Matter {
+    let material = surface.target.material;
+    let mut matter = Matter::new(surface, base, context.textures);
+    if path.scattered > SPREAD {
+        matter.blur(path.scattered);
+    }
+    if !context.lights.is_empty() {
+        let least = |map| glint::least_square(surface, map, context, path.cone_spread);
+        if matter.has_narrow_highlight() {
+            matter.widen_highlight(least((material.normal_map.as_ref(), material.normal_scale)));
+        }
+        if let Some(coat) = matter.coat.as_mut().filter(|coat| coat.has_narrow_highlight()) {
+            let of_coat = material.metal_rough().and_then(|m| m.coat.as_ref());
+            coat.widen_highlight(least(of_coat.map_or((None, 1.0), |c| (c.normal_map.as_ref(), c.normal_scale))));
+        }
+    }
+    if path.depth < context.depth && context.gloss.spreads(material) {
+        matter.spread_by_rays();
+    }
+    matter
 }

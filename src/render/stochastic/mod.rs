@@ -64,6 +64,20 @@ struct Sampler<'a> {
     rounds: Vec<u32>,
 }
 
+/// A tile on its way.
+struct Course {
+    tile: Tile,
+    /// What is seen of it and around it.
+    around: Around,
+    /// Pixels that have, or get, more than one sample.
+    pixels: Vec<Pixel>,
+    /// Those that go on, by number.
+    active: Vec<usize>,
+    /// Buffers.
+    places: Places,
+    errors: Vec<f32>,
+}
+
 impl<'a> Sampler<'a> {
     fn new(frame: &'a Frame, how: &'a Stochastic, output: Option<&'a Output>, background: Option<Background>) -> Self {
         let transparent = matches!(background, None | Some(Background::Transparent));
@@ -101,14 +115,41 @@ impl<'a> Sampler<'a> {
         tile: Tile,
         first: &[&First],
     ) -> Option<TilePixels> {
-        let Self { judge, rounds, .. } = self;
-        let reach = self.reach();
-        let mut around = Around::new(self.grown(tile, reach), first);
-        let known = self.grown(tile, reach.saturating_sub(1));
-        let (mut pixels, mut done) = (Vec::with_capacity(around.tile.pixels()), self.nothing(tile));
+        let (mut course, mut done) = self.begin(tile, first);
         // How many samples of each pixel are there already: those of the first round, or none.
         let taken = u32::from(self.starts_with_one());
-        if taken == 1 {
+        let mut from = taken;
+        for (round, &to) in self.rounds.iter().enumerate().skip(usize::from(taken == 1)) {
+            if course.active.is_empty() {
+                break;
+            }
+            self.trace(tracer, &mut course.places, (&mut course.pixels, &course.active), from..to)?;
+            if round < looks(&self.rounds) {
+                self.look_around(tracer, &mut course, first, (round, from..to))?;
+            }
+            if to >= FIRST_LOOK {
+                self.look(tracer, &mut course, to)?;
+            }
+            course.active.retain(|&i| course.pixels[i].facts.end == End::Ceiling);
+            from = to;
+        }
+        for pixel in course.pixels.iter_mut().filter(|pixel| pixel.variance().is_some()) {
+            course.around.compare(pixel);
+            if pixel.facts.end == End::Met {
+                pixel.look(&self.judge);
+            }
+        }
+        self.put(&course.pixels, taken, &mut done);
+        Some(done)
+    }
+
+    /// What a tile begins with, and what is done of it then.
+    fn begin(&self, tile: Tile, first: &[&First]) -> (Course, TilePixels) {
+        let reach = self.reach();
+        let mut around = Around::new(self.grown(tile, reach), first);
+        let (mut pixels, mut done) = (Vec::with_capacity(around.tile.pixels()), self.nothing(tile));
+        if self.starts_with_one() {
+            let known = self.grown(tile, reach.saturating_sub(1));
             self.take_first(first, &mut around, known, (&mut pixels, &mut done));
         } else {
             around.tile.places().for_each(|at| {
@@ -116,50 +157,52 @@ impl<'a> Sampler<'a> {
                 pixels.push(self.pixel(at));
             });
         }
-        let (mut active, mut errors): (Vec<usize>, _) = ((0..pixels.len()).collect(), Vec::new());
-        let (mut from, mut places) = (taken, Places::default());
-        for (round, &to) in rounds.iter().enumerate().skip(usize::from(taken == 1)) {
-            if active.is_empty() {
-                break;
-            }
-            self.trace(tracer, &mut places, (&mut pixels, &active), from..to)?;
-            if round < looks(rounds) {
-                around.see(judge, &pixels, &active);
-                let mut news = if from > 0 { active.clone() } else { Vec::new() };
-                while !news.is_empty() {
-                    let open = |at| self.opened(first, at);
-                    news = around.reopen(judge, &mut pixels, (&news, from), known, open);
-                    self.trace(tracer, &mut places, (&mut pixels, &news), from..to)?;
-                    around.see(judge, &pixels, &news);
-                    active.extend(&news);
-                }
-                // Of the outermost pixels nobody knows what lies beyond.
-                let known = self.grown(tile, reach.saturating_sub(round + 1));
-                active.retain(|&i| known.contains(pixels[i].at));
-                around.judge(judge, &mut pixels, &active);
-            }
-            if to >= FIRST_LOOK {
-                around.look(judge, &mut pixels, &active, &mut errors);
-                let mut news = active.clone();
-                while !news.is_empty() {
-                    news = around.late(judge, &mut pixels, (&news, to), tile);
-                    // Those with as many samples are active still.
-                    active.extend(news.iter().filter(|&&i| pixels[i].facts.count < to));
-                    self.catch_up(tracer, &mut places, (&mut pixels, &news), to)?;
-                    around.look(judge, &mut pixels, &news, &mut errors);
-                }
-            }
-            active.retain(|&i| pixels[i].facts.end == End::Ceiling);
-            from = to;
+        let active = (0..pixels.len()).collect();
+        (Course { tile, around, pixels, active, places: Places::default(), errors: Vec::new() }, done)
+    }
+
+    /// Looks at the pixels beside each that goes on, after a round of these samples: of those near uneven ones that were done,
+    /// others go on, too, and those that are certain by what is beside them are done.
+    fn look_around<A: Accel, P: Observer>(
+        &self,
+        tracer: &mut Tracer<A, P>,
+        course: &mut Course,
+        first: &[&First],
+        (round, samples): (usize, Range<u32>),
+    ) -> Option<()> {
+        let Course { tile, around, pixels, active, places, .. } = course;
+        let (judge, reach) = (&self.judge, self.reach());
+        let known = self.grown(*tile, reach.saturating_sub(1));
+        around.see(judge, pixels, active);
+        let mut news = if samples.start > 0 { active.clone() } else { Vec::new() };
+        while !news.is_empty() {
+            let open = |at| self.opened(first, at);
+            news = around.reopen(judge, pixels, (&news, samples.start), known, open);
+            self.trace(tracer, places, (pixels, &news), samples.clone())?;
+            around.see(judge, pixels, &news);
+            active.extend(&news);
         }
-        for pixel in pixels.iter_mut().filter(|pixel| pixel.variance().is_some()) {
-            around.compare(pixel);
-            if pixel.facts.end == End::Met {
-                pixel.look(judge);
-            }
+        // Of the outermost pixels nobody knows what lies beyond.
+        let known = self.grown(*tile, reach.saturating_sub(round + 1));
+        active.retain(|&i| known.contains(pixels[i].at));
+        around.judge(judge, pixels, active);
+        Some(())
+    }
+
+    /// Finds out how certain the pixels that go on are, with so many samples; those beside them that seemed so with fewer, and are
+    /// not by what is known now, get as many.
+    fn look<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, course: &mut Course, samples: u32) -> Option<()> {
+        let Course { tile, around, pixels, active, places, errors } = course;
+        around.look(&self.judge, pixels, active, errors);
+        let mut news = active.clone();
+        while !news.is_empty() {
+            news = around.late(&self.judge, pixels, (&news, samples), *tile);
+            // Those with as many samples are active still.
+            active.extend(news.iter().filter(|&&i| pixels[i].facts.count < samples));
+            self.catch_up(tracer, places, (pixels, &news), samples)?;
+            around.look(&self.judge, pixels, &news, errors);
         }
-        self.put(&pixels, taken, &mut done);
-        Some(done)
+        Some(())
     }
 
     /// A tile with nothing in its pixels.
