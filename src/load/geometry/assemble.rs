@@ -46,14 +46,6 @@ pub(super) fn assemble(
     let mut out = Assembled::default();
     let faces = keep(geometry, soup, &placed.positions, &mut out);
     let smooth = smooth(soup, &placed.positions, &faces);
-    if smooth.of_corner.is_empty()
-        && let Some(triangles) = triangles_alone(geometry, soup, &placed.positions, &faces)
-    {
-        out.faces = faces.len() as u64;
-        let (name, positions) = (name(geometry, 0), placed.positions.clone());
-        out.meshes.push((0, Mesh { name, positions, triangles, ..Mesh::default() }));
-        return out;
-    }
     let flatness = (polygons == Polygons::Whole).then_some(flatness);
     let mut builder = Builder {
         soup,
@@ -95,22 +87,6 @@ pub(super) fn as_they_are(geometry: &mut Geometry, soup: &Soup, placed: &Placed)
     let colors = colors(soup, (0..positions.len()).into_par_iter());
     let mesh = Mesh { name, positions, triangles, colors, ..Mesh::default() };
     Assembled { meshes: vec![(0, mesh)], faces, ..Assembled::default() }
-}
-
-/// The triangles of a file that has nothing else, where they use all of its positions: these are the vertices then, in the
-/// file's order. Most scans are such files.
-fn triangles_alone(geometry: &Geometry, soup: &Soup, positions: &[Vec3], faces: &[Face]) -> Option<Vec<[u32; 3]>> {
-    let Soup { positions: _, uvs, normals, colors, alphas, corners, stroke_corners } = soup;
-    let (corners, rest) = corners.as_chunks::<3>();
-    let alone = geometry.runs.len() == 1
-        && (uvs.is_empty() && normals.is_empty() && colors.is_empty() && alphas.is_empty())
-        && (rest.is_empty() && stroke_corners.is_empty() && corners.len() == faces.len());
-    let in_order = |(face, i): (&Face, u32)| face.arity == 3 && face.number == i && face.first == 3 * i;
-    // What nothing uses has no place.
-    let are_used = || positions.par_iter().with_min_len(FACES).all(|p| p.is_finite());
-    let are_in_order = || faces.iter().zip(0..).all(in_order);
-    let triangles = || corners.par_iter().with_min_len(FACES).map(|[a, b, c]| [a.position, b.position, c.position]);
-    (alone && !faces.is_empty() && are_in_order() && are_used()).then(|| triangles().collect())
 }
 
 /// The faces that can be drawn; mostly all, which are not copied.

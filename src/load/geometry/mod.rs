@@ -31,6 +31,8 @@ pub(super) struct Geometry {
     /// The vertices of triangles, of a file that has no other faces and says nothing of their corners but what it says of
     /// vertices, and no normals: most scans. [`Self::faces`] and what goes with them are empty then.
     pub triangles: Vec<[u32; 3]>,
+    /// Where these stand in the file, where that is not told by their numbers.
+    pub stretches: Vec<Stretch>,
     pub faces: Vec<Face>,
     pub strokes: Vec<Stroke>,
     /// Whether every vertex is a point instead, which has the normal of the same number; coordinates do not count.
@@ -72,6 +74,27 @@ impl Face {
     }
 }
 
+/// Faces that follow each other line by line, with as many corners each, and all else that they share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Stretch {
+    /// The first of them.
+    pub face: Face,
+    pub count: u32,
+}
+
+impl Stretch {
+    /// The `i`th of them; the one behind the last is what may be added.
+    pub(super) fn face(&self, i: u32) -> Face {
+        let Face { line, number, first, arity, .. } = self.face;
+        let (line, number) = (line.saturating_add(i), number.saturating_add(i));
+        Face { line, number, first: first.saturating_add(i.saturating_mul(arity)), ..self.face }
+    }
+
+    pub(super) fn faces(&self) -> impl Iterator<Item = Face> {
+        (0..self.count).map(|i| self.face(i))
+    }
+}
+
 /// One `p` or `l` statement, without its corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Stroke {
@@ -101,8 +124,12 @@ impl Geometry {
         let triangles = std::mem::take(&mut self.triangles);
         let corner = |&position: &u32| Corner { position, uv: NONE, normal: NONE };
         self.soup.corners = triangles.as_flattened().iter().map(corner).collect();
-        let face = |number: u32| Face { run: 0, smoothing: 0, arity: 3, line: number, number, first: 3 * number };
-        self.faces = (0..triangles.len() as u32).map(face).collect();
+        let mut stretches = std::mem::take(&mut self.stretches);
+        if stretches.is_empty() {
+            let face = Face { run: 0, smoothing: 0, arity: 3, line: 0, number: 0, first: 0 };
+            stretches.push(Stretch { face, count: triangles.len() as u32 });
+        }
+        self.faces = stretches.iter().flat_map(Stretch::faces).collect();
     }
 
     /// Makes every vertex a point; the `i`th has the `i`th normal where there are as many.

@@ -6,7 +6,7 @@
 //! them) and read in one pass over their bytes; everything else goes word by word.
 
 use super::statements::Oddities;
-use crate::load::geometry::{Face, LARGEST, Run, Stroke};
+use crate::load::geometry::{Face, LARGEST, Run, Stretch, Stroke};
 use crate::load::number::{self, Plain};
 use crate::load::text::encoding::decode_name;
 use crate::load::text::lines::{Lines, keyword, without_comment, words};
@@ -40,11 +40,11 @@ pub(super) struct Chunk {
     pub colors: Vec<[f32; 3]>,
     /// Colours that a program has written into comments, 0…255: of the first vertices of the file, one after the other.
     pub paint: Vec<[u8; 3]>,
-    /// Corners of all faces: numbers of `v`, `vt`, `vn` from 1, for [`resolve`]; 0: none given.
-    pub corners: Vec<[u32; 3]>,
+    /// Corners of all faces.
+    pub corners: Corners,
     /// Corners of faces that have too few.
     pub dropped: Vec<[u32; 3]>,
-    pub faces: Vec<Face>,
+    pub faces: Vec<Stretch>,
     /// Points and lines.
     pub strokes: Vec<Stroke>,
     /// Their corners, as [`Self::corners`].
@@ -64,6 +64,48 @@ pub(super) struct Chunk {
     pub smoothing: u32,
     /// Whether a corner cannot be read: the file is refused, and another pass finds out why.
     pub faulty: bool,
+}
+
+/// Corners: numbers of `v`, `vt`, `vn` from 1, for [`resolve`]; 0: none given.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Corners {
+    /// Those of `v`, as long as no corner names anything else: most scans have no more.
+    vertices: Vec<u32>,
+    all: Vec<[u32; 3]>,
+}
+
+impl Corners {
+    pub(super) fn len(&self) -> usize {
+        self.vertices.len().max(self.all.len())
+    }
+
+    #[inline]
+    pub(super) fn get(&self, i: usize) -> [u32; 3] {
+        self.all.get(i).copied().unwrap_or_else(|| [self.vertices[i], 0, 0])
+    }
+
+    /// The numbers of `v`, where no corner names anything else.
+    pub(super) fn vertices_alone(&self) -> Option<&[u32]> {
+        self.all.is_empty().then_some(&self.vertices)
+    }
+
+    #[inline]
+    fn push(&mut self, corner: [u32; 3]) {
+        match corner {
+            [vertex, 0, 0] if self.all.is_empty() => self.vertices.push(vertex),
+            _ => {
+                if !self.vertices.is_empty() {
+                    self.all.extend(self.vertices.drain(..).map(|vertex| [vertex, 0, 0]));
+                }
+                self.all.push(corner);
+            }
+        }
+    }
+
+    fn truncate(&mut self, len: usize) {
+        self.vertices.truncate(len);
+        self.all.truncate(len);
+    }
 }
 
 /// Comments that are kept: generators write theirs first.
@@ -428,7 +470,9 @@ impl Reader {
         }
         let arity = count(self.out.corners.len() - first);
         if arity < 3 {
-            self.out.dropped.extend(self.out.corners.drain(first..));
+            let corners = &self.out.corners;
+            self.out.dropped.extend((first..corners.len()).map(|i| corners.get(i)));
+            self.out.corners.truncate(first);
             self.out.face_count = self.out.face_count.saturating_add(1);
             return self.out.odd.few_corners.note(self.line, rest);
         }
@@ -502,7 +546,11 @@ impl Reader {
         let run = self.run();
         let (line, number) = (self.line, self.out.face_count);
         let first = count(self.out.corners.len()).saturating_sub(arity);
-        self.out.faces.push(Face { run, smoothing: self.out.smoothing, arity, line, number, first });
+        let face = Face { run, smoothing: self.out.smoothing, arity, line, number, first };
+        match self.out.faces.last_mut() {
+            Some(stretch) if stretch.face(stretch.count) == face => stretch.count += 1,
+            _ => self.out.faces.push(Stretch { face, count: 1 }),
+        }
         self.out.face_count = self.out.face_count.saturating_add(1);
     }
 

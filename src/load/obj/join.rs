@@ -2,8 +2,9 @@
 
 use super::chunk::{COMMENTS, Chunk, NO_COLOR, OPEN, count, resolve};
 use super::statements::Statements;
-use crate::load::geometry::{Corner, Geometry, LARGEST, NONE, Run, Soup, Stroke};
+use crate::load::geometry::{Corner, Geometry, LARGEST, NONE, Run, Soup, Stretch, Stroke};
 use crate::math::{DVec2, DVec3, Vec3};
+use bytemuck::Zeroable;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -45,27 +46,70 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
     let colors = chunks.iter().any(|c| !c.colors.is_empty());
     let colors = if colors { all_colors(&chunks, &begins, counts[0]) } else { painted(&chunks, counts[0]) };
     let (positions, uvs, normals) = vertices(&mut chunks);
+    let stretches = stretches(&chunks, &begins, &runs);
+    let is_plain = uvs.is_empty() && normals.is_empty() && colors.is_empty() && table.runs.len() == 1;
+    let plain = if is_plain { triangles(&chunks, &begins, counts[0], &stretches) } else { None };
     let there = There { counts, uvs: &uvs, normals: &normals };
-    let (corners, faulty) = corners(&chunks, &begins, &there);
+    let (corners, mut faulty) = if plain.is_some() { (Vec::new(), false) } else { corners(&chunks, &begins, &there) };
+    let stroke_corners = strokes(&chunks, &begins, &runs, &there, &mut out);
+    faulty |= chunks.iter().any(|c| c.faulty);
+    drop(chunks);
+    let soup = Soup { positions, uvs, normals, colors, alphas: Vec::new(), corners, stroke_corners };
+    out.geometry = Geometry { soup, names: table.names, runs: table.runs, ..out.geometry };
+    match plain {
+        Some(triangles) => (out.geometry.triangles, out.geometry.stretches) = (triangles, stretches),
+        None => out.geometry.faces = stretches.iter().flat_map(Stretch::faces).collect(),
+    }
+    Ok(Joined { statements: out, faulty })
+}
 
-    // Faces come last: they are read more often than they are written.
+/// The faces of all runs of lines, as the whole numbers them.
+fn stretches(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<Stretch> {
+    let mut all: Vec<Stretch> = Vec::new();
     let mut first = 0;
-    for ((chunk, before), runs) in chunks.iter_mut().zip(&begins).zip(&runs) {
-        for face in &mut chunk.faces {
+    for ((chunk, before), runs) in chunks.iter().zip(begins).zip(runs) {
+        for &Stretch { mut face, count } in &chunk.faces {
             face.first += first;
             face.run = runs[face.run as usize];
             face.line = face.line.saturating_add(before.lines);
             face.number += before.faces;
             face.smoothing = if face.smoothing == OPEN { before.smoothing } else { face.smoothing };
+            match all.last_mut() {
+                Some(last) if last.face(last.count) == face => last.count += count,
+                _ => all.push(Stretch { face, count }),
+            }
         }
         first += count(chunk.corners.len());
     }
-    let faces = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.faces)));
-    let stroke_corners = strokes(&chunks, &begins, &runs, &there, &mut out);
-    let soup = Soup { positions, uvs, normals, colors, alphas: Vec::new(), corners, stroke_corners };
-    out.geometry = Geometry { soup, faces, names: table.names, runs: table.runs, ..out.geometry };
-    let faulty = faulty || chunks.iter().any(|c| c.faulty);
-    Ok(Joined { statements: out, faulty })
+    all
+}
+
+/// The vertices of triangles, of so many, where there is nothing else and nothing more is said of them; `None` too where one is
+/// not there.
+fn triangles(chunks: &[Chunk], begins: &[Before], vertices: u32, stretches: &[Stretch]) -> Option<Vec<[u32; 3]>> {
+    let is_plain = |stretch: &Stretch| (stretch.face.arity, stretch.face.smoothing) == (3, 0);
+    let of_faces = |chunk: &Chunk| chunk.strokes.is_empty() && chunk.dropped.is_empty() && !chunk.faulty;
+    let faces: u64 = chunks.iter().map(|chunk| u64::from(chunk.face_count)).sum();
+    let drawn: u64 = stretches.iter().map(|stretch| u64::from(stretch.count)).sum();
+    if drawn == 0 || drawn != faces || !stretches.iter().all(is_plain) || !chunks.iter().all(of_faces) {
+        return None;
+    }
+    let numbers = chunks.iter().map(|chunk| chunk.corners.vertices_alone()).collect::<Option<Vec<&[u32]>>>()?;
+    let mut all: Vec<[u32; 3]> = bytemuck::zeroed_vec(usize::try_from(drawn).ok()?);
+    let parts = cut(&mut all, numbers.iter().map(|numbers| numbers.len() / 3));
+    let fill = |((part, numbers), before): ((&mut [[u32; 3]], &[u32]), &Before)| {
+        part.as_flattened_mut().iter_mut().zip(numbers).all(|(vertex, &number)| {
+            // 0 is none.
+            *vertex = resolve(number, before.counts[0]).unwrap_or(0).wrapping_sub(1);
+            *vertex < vertices
+        })
+    };
+    parts.into_par_iter().zip(numbers).zip(begins).all(fill).then_some(all)
+}
+
+/// Parts of so many items each, of a list that is as long as all of them.
+fn cut<T>(mut all: &mut [T], lengths: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
+    lengths.map(|length| all.split_off_mut(..length).unwrap_or_default()).collect()
 }
 
 fn check_sizes(chunks: &[Chunk]) -> Result<(), u64> {
@@ -191,13 +235,15 @@ fn vertices(chunks: &mut [Chunk]) -> (Vec<DVec3>, Vec<DVec2>, Vec<Vec3>) {
 }
 
 /// All lists as one; a single one is not copied.
-fn flat<T: Copy>(lists: impl ExactSizeIterator<Item = Vec<T>>) -> Vec<T> {
+fn flat<T: Copy + Zeroable + Send + Sync>(lists: impl ExactSizeIterator<Item = Vec<T>>) -> Vec<T> {
     let mut lists: Vec<Vec<T>> = lists.collect();
     if lists.len() == 1 {
         return lists.pop().unwrap_or_default();
     }
-    let mut all = Vec::with_capacity(lists.iter().map(Vec::len).sum());
-    lists.into_iter().for_each(|list| all.extend_from_slice(&list));
+    // Its pages are made by the threads that write there.
+    let mut all: Vec<T> = bytemuck::zeroed_vec(lists.iter().map(Vec::len).sum());
+    let parts = cut(&mut all, lists.iter().map(Vec::len));
+    parts.into_par_iter().zip(lists).for_each(|(part, list)| part.copy_from_slice(&list));
     all
 }
 
@@ -255,22 +301,16 @@ fn strokes(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>], there: &There
 fn corners(chunks: &[Chunk], begins: &[Before], there: &There) -> (Vec<Corner>, bool) {
     // Its pages are made by the threads that write there.
     let mut all: Vec<Corner> = bytemuck::zeroed_vec(chunks.iter().map(|c| c.corners.len()).sum());
-    let mut parts = Vec::with_capacity(chunks.len());
-    let mut rest = all.as_mut_slice();
-    for (chunk, before) in chunks.iter().zip(begins) {
-        let (part, after) = std::mem::take(&mut rest).split_at_mut(chunk.corners.len());
-        parts.push((chunk, before, part));
-        rest = after;
-    }
-    let fill = |(chunk, before, part): (&Chunk, &Before, &mut [Corner])| {
+    let parts = cut(&mut all, chunks.iter().map(|chunk| chunk.corners.len()));
+    let fill = |((part, chunk), before): ((&mut [Corner], &Chunk), &Before)| {
         let mut faulty = chunk.dropped.iter().any(|numbers| there.corner(numbers, before).1);
-        for (corner, numbers) in part.iter_mut().zip(&chunk.corners) {
+        for (i, corner) in part.iter_mut().enumerate() {
             let odd;
-            (*corner, odd) = there.corner(numbers, before);
+            (*corner, odd) = there.corner(&chunk.corners.get(i), before);
             faulty |= odd;
         }
         faulty
     };
-    let faulty = parts.into_par_iter().map(fill).reduce(|| false, |a, b| a | b);
+    let faulty = parts.into_par_iter().zip(chunks).zip(begins).map(fill).reduce(|| false, |a, b| a | b);
     (all, faulty)
 }

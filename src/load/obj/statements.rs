@@ -102,7 +102,8 @@ fn read_in_runs(text: &[u8], run: usize, file: &Path, budget: &mut Budget) -> Re
             .map_err(|over| Diagnostic::over_budget(file, over))?;
         statements.geometry.draw_points();
     } else {
-        statements.geometry.soup.leave_out_unused(&[]);
+        let Geometry { soup, triangles, .. } = &mut statements.geometry;
+        soup.leave_out_unused(triangles);
     }
     statements.geometry.few_corners = statements.odd.few_corners.count;
     Ok(statements)
@@ -116,8 +117,8 @@ impl Statements {
     fn is_cloud(&self) -> bool {
         let odd = &self.odd;
         let others = [&odd.strokes, &odd.curves, &odd.calls, &odd.few_corners, &odd.absent];
-        let Geometry { faces, strokes, .. } = &self.geometry;
-        faces.is_empty() && strokes.is_empty() && others.iter().all(|tally| tally.count == 0)
+        let Geometry { faces, triangles, strokes, .. } = &self.geometry;
+        faces.is_empty() && triangles.is_empty() && strokes.is_empty() && others.iter().all(|tally| tally.count == 0)
     }
 }
 
@@ -153,7 +154,7 @@ fn bytes(chunk: &Chunk) -> u64 {
     let vertices =
         chunk.positions.len() + chunk.uvs.len() + chunk.normals.len() + chunk.colors.len() + chunk.paint.len();
     let corners = chunk.corners.len() + chunk.stroke_corners.len();
-    let faces = chunk.faces.len() + chunk.strokes.len();
+    let faces = chunk.face_count as usize + chunk.strokes.len();
     let texts = chunk.names.iter().chain(chunk.libraries.iter().map(|(_, names)| names));
     let names: u64 = texts.map(|name| NAME + 4 * name.len() as u64).sum();
     // One of its own each may have.
@@ -234,8 +235,13 @@ mod tests {
         read(text.as_bytes(), Path::new("m.obj"), &mut Budget::new(&Limits { memory, ..Limits::default() }))
     }
 
+    /// With all faces and their corners.
     fn of(text: &str) -> Statements {
-        read_with(text, u64::MAX).unwrap()
+        let mut statements = read_with(text, u64::MAX).unwrap();
+        if !statements.geometry.triangles.is_empty() {
+            statements.geometry.spell_out();
+        }
+        statements
     }
 
     fn fault(text: &str) -> String {
@@ -403,12 +409,60 @@ mod tests {
         text
     }
 
+    fn in_runs(text: &str, run: usize) -> Statements {
+        let mut budget = Budget::new(&Limits::default());
+        read_in_runs(text.as_bytes(), run, Path::new("m.obj"), &mut budget).unwrap()
+    }
+
+    /// Triangles of which nothing is said, with blank lines and comments between them, and some that count back.
+    fn plain_triangles() -> String {
+        let faces = (0..40).map(|i| match i % 9 {
+            3 => "f 3 1 4\n\n".into(),
+            5 => "v 1 2 3\nf 1 2 -1\n".into(),
+            7 => "# half\nf 4 2 1 \n".into(),
+            _ => format!("f {} {} 4\n", 1 + i % 2, 3 - i % 2),
+        });
+        format!("o a\n{TRIANGLE}v 0 0 1\n{}", faces.collect::<String>())
+    }
+
+    #[test]
+    fn triangles_of_which_nothing_is_said_are_those_that_are_spelt_out() {
+        let text = plain_triangles();
+        for run in [1 << 30, 1, 20, 77] {
+            let mut plain = in_runs(&text, run);
+            // A coordinate that no corner names is enough.
+            let spelt = in_runs(&format!("{text}vt 0 0\n"), run);
+            assert_eq!((plain.geometry.triangles.len(), spelt.geometry.triangles.len()), (40, 0));
+            assert!(plain.geometry.faces.is_empty() && plain.geometry.soup.corners.is_empty());
+            plain.geometry.spell_out();
+            assert_eq!(plain.geometry.faces, spelt.geometry.faces, "in runs of {run} bytes");
+            assert_eq!(plain.geometry.soup.corners, spelt.geometry.soup.corners, "in runs of {run} bytes");
+        }
+    }
+
+    #[test]
+    fn what_says_more_of_triangles_has_them_spelt_out() {
+        let plain = |more: &str| !in_runs(&format!("{TRIANGLE}f 1 2 3\n{more}"), 1 << 30).geometry.triangles.is_empty();
+        assert!(plain("") && plain("f 3 2 1\n# end\n"));
+        for more in [
+            "f 1 2 3 1\n",
+            "f 1 2\n",
+            "f\n",
+            "l 1 2\n",
+            "s 1\nf 1 2 3\n",
+            "g b\nf 1 2 3\n",
+            "v 0 0 0 1 0 0\n",
+            "vn 0 0 1\n",
+        ] {
+            assert!(!plain(more), "{more}");
+        }
+    }
+
     #[test]
     fn runs_of_lines_read_side_by_side_make_the_same_whole() {
         let text = all_kinds();
         let read = |run: usize| {
-            let mut budget = Budget::new(&Limits::default());
-            let s = read_in_runs(text.as_bytes(), run, Path::new("m.obj"), &mut budget).unwrap();
+            let s = in_runs(&text, run);
             let mut warnings = Warnings::default();
             s.odd.warn(Path::new("m.obj"), &mut warnings);
             format!("{s:?} {:?}", warnings.into_vec())

@@ -314,6 +314,7 @@ fn geometry(mut bare: Bare, file: &Path, warnings: &mut Warnings) -> Geometry {
         names: std::iter::once(String::new()).chain(pictures.iter().map(|(_, name)| name.clone())).collect(),
         sources: pictures,
         triangles: Vec::new(),
+        stretches: Vec::new(),
         places: bare.places.unwrap_or(EXACT),
         comments: bare.comments,
         few_corners: u32::try_from(bare.few_corners).unwrap_or(u32::MAX),
