@@ -9,7 +9,7 @@ use crate::load::Diagnostic;
 use crate::load::paths::lexical;
 use crate::render::Cost;
 use std::fs;
-use std::path::{Component, Path, PathBuf, is_separator};
+use std::path::{Component, Path, PathBuf, absolute, is_separator};
 
 /// Where a picture goes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -101,9 +101,13 @@ fn files<'a>(shots: impl Iterator<Item = &'a Shot>, beside: Beside) -> Vec<PathB
 
 /// The folder of a file, if it is one that may be made for pictures.
 pub(super) fn grows_with<'a>(batches: &'a [Batch], file: &Path) -> Option<&'a Path> {
-    let folder = lexical(file.parent()?);
+    let folder = file.file_name().and_then(|_| file.parent())?;
+    // Ways through a folder that is not there lead nowhere.
+    let leads_back = folder.components().any(|part| part == Component::ParentDir);
+    let whole = |path: &Path| absolute(path).ok().filter(|_| !leads_back);
+    let is_same = |growth: &&Path| *growth == folder || whole(growth).is_some_and(|at| whole(folder) == Some(at));
     let mut growths = batches.iter().flat_map(|batch| &batch.shots).filter_map(|shot| shot.growth.as_deref());
-    growths.find(|growth| lexical(growth) == folder)
+    growths.find(is_same)
 }
 
 /// Makes the folder of a picture, if it is one that may be made.

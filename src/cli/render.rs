@@ -38,7 +38,7 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
     // A picture that is repeated may be replaced by its repetition, but by nothing else.
     let spared = |path| Sources::of(&job.again).spared_by(path, "--stats-file");
     if let Some(path) = job.stats_file() {
-        let growth = outputs::grows_with(&job.batches, path);
+        let growth = outputs::grows_with(&job.batches, path).filter(|growth| !growth.is_dir());
         let checked = writable::check_in(path, "--stats-file", growth, &so_far.sources);
         if let Err(fault) = checked.and_then(|()| spared(path)) {
             return messages.fail(&fault, Exit::Failed);

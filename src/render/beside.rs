@@ -48,6 +48,14 @@ impl<'a> Traced<'a> {
         }
     }
 
+    /// What the `i`th ray carries behind what it has hit, if that is a hole.
+    fn path_through(self, i: usize) -> Path {
+        match self {
+            Self::Eyes(eyes) => eyes.path(i),
+            Self::Wave(_, wave) => Path { crossed: wave.crossed(i), ..wave.paths[i] },
+        }
+    }
+
     /// What the `i`th ray carries.
     pub(crate) fn path(self, i: usize) -> Path {
         match self {
@@ -216,18 +224,18 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
 
     /// Whether the `i`th ray has crossed already what it has hit.
     fn is_crossed(&self, wave: &Wave, i: usize) -> bool {
-        let (ray, before, hit) = (&wave.rays[i], &wave.after[i], &wave.hits[i]);
+        let (ray, hit) = (&wave.rays[i], &wave.hits[i]);
         let face = |prim| self.context.face(prim);
         match wave.starts {
-            true => wave.touches(i) && is_same_surface(face, ray, before, hit),
-            false => !wave.paths[i].behind_hole && is_same_crossing(face, ray, before, hit),
+            true => wave.touches(i) && is_same_surface(face, ray, &wave.after[i], hit),
+            false => is_same_crossing(face, ray, &wave.paths[i].crossed, hit),
         }
     }
 
     /// Shades what the `i`th ray has hit.
     fn shade_one(&mut self, traced: Traced, i: usize) {
         let (ray, hit) = (&traced.rays()[i], &traced.hits()[i]);
-        self.shade(traced.class(), (ray, hit, traced.touches(i)), &traced.path(i));
+        self.shade(traced.class(), (ray, hit, traced.touches(i)), &traced.path_through(i));
     }
 
     fn sort(&mut self) -> Sorted {
@@ -340,7 +348,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         match passed {
             Passed::Back => self.continuing[class as usize].push_behind(*ray, lessened(path), *hit),
             Passed::Covered(covered) if covered <= 0.0 => {
-                self.continuing[class as usize].push_through(*ray, path, *hit);
+                self.continuing[class as usize].push(*ray, traced.path_through(at), *hit);
             }
             Passed::Covered(covered) => self.go_on(ray, &lessened(path), hit, covered),
         }

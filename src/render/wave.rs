@@ -35,8 +35,8 @@ pub(crate) struct Path {
     pub depth: u32,
     /// Whether the ray still runs along the line of sight, so that what lies behind shows through.
     pub straight: bool,
-    /// Of a ray that goes on behind a hit, whether nothing was there: then it has crossed nothing.
-    pub behind_hole: bool,
+    /// Of a ray that goes on behind a hit, what it crossed last, where that was no hole; [`Hit::MISS`]: nothing.
+    pub crossed: Hit,
     /// The part of the spectrum this ray carries, once dispersion has split it.
     pub band: Option<u8>,
     /// What the ray is inside of.
@@ -61,7 +61,7 @@ impl Path {
             part: 1.0,
             depth: 0,
             straight: true,
-            behind_hole: false,
+            crossed: Hit::MISS,
             band: None,
             media,
             since: 0.0,
@@ -185,14 +185,9 @@ impl Queue {
         self.after.push(after);
     }
 
-    /// Adds a ray that goes on behind a hit, where something was.
+    /// Adds a ray that goes on behind a hit, where something was. Behind a hole it has crossed what it had before.
     pub(crate) fn push_behind(&mut self, ray: Ray, path: Path, hit: Hit) {
-        self.push(ray, Path { behind_hole: false, ..path }, hit);
-    }
-
-    /// The same where nothing was.
-    pub(crate) fn push_through(&mut self, ray: Ray, path: Path, hit: Hit) {
-        self.push(ray, Path { behind_hole: true, ..path }, hit);
+        self.push(ray, Path { crossed: hit, ..path }, hit);
     }
 
     /// Moves the last rays, at most `limit`, into `wave`.
@@ -264,17 +259,25 @@ impl Wave {
     pub(crate) fn touches(&self, i: usize) -> bool {
         /// More than places err, in parts of what they are computed from, where a ray does not graze the surface.
         const NEAR: f32 = 1.0 / (1 << 16) as f32;
-        let (ray, before, hit) = (&self.rays[i], &self.after[i], &self.hits[i]);
+        let (ray, hit) = (&self.rays[i], &self.hits[i]);
+        let before = if self.starts { &self.after[i] } else { &self.paths[i].crossed };
         if !before.is_some() {
             return false;
         }
         if self.starts {
             return hit.t <= before.t;
         }
-        if self.paths[i].behind_hole {
-            return false;
-        }
         hit.t - before.t <= NEAR * (hit.t + ray.origin.abs().max_element())
+    }
+
+    /// What the `i`th ray has crossed last if what it has hit is a hole.
+    pub(crate) fn crossed(&self, i: usize) -> Hit {
+        match self.starts {
+            // What it has met at its start it meets in the same place.
+            true if self.touches(i) => Hit { t: self.hits[i].t, ..self.after[i] },
+            true => Hit::MISS,
+            false => self.paths[i].crossed,
+        }
     }
 
     fn clear(&mut self) {

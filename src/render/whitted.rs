@@ -228,7 +228,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let base = reader.base(material);
         let covered = coverage(material, base.w);
         if covered <= 0.0 {
-            return self.continuing[class as usize].push_through(*ray, *before, *hit);
+            return self.continuing[class as usize].push(*ray, *before, *hit);
         }
         if covered < 1.0 {
             self.go_on(ray, path, hit, covered);

@@ -49,8 +49,15 @@ fn statistics_go_into_the_folder_that_is_made_for_pictures_and_into_no_other() {
     folder.render(&stats("gone/stats.json")).ends(1).says(&["its folder is not there", "--stats-file"]);
     folder.render(&stats("new/deep/stats.json")).ends(1).says(&["its folder is not there", "--stats-file"]);
     assert!(!folder.has("new"), "nothing is done before");
+    for elsewhere in ["gone/../new/stats.json", "new/.."] {
+        folder.render(&stats(elsewhere)).ends(1).says(&["--stats-file"]);
+    }
+    assert!(!folder.has("new"), "nothing is done before");
     folder.render(&stats("./new/stats.json")).ends(0);
     assert!(folder.has("new/a.png") && folder.has("new/stats.json"));
+    let whole = folder.path("whole/stats.json").display().to_string();
+    folder.render(&["all", "-o", "whole/", "--stats", "json", "--stats-file", &whole]).ends(0);
+    assert!(folder.has("whole/stats.json"), "however the folder is named");
     folder.render(&["all", "-o", "plan/", "--dry-run", "--stats-file", "plan/plan.txt"]).ends(0);
     assert!(folder.has("plan/plan.txt"), "no picture has made it");
 }

@@ -31,7 +31,7 @@ pub(super) struct Geometry {
     /// The vertices of triangles, of a file that has no other faces and says nothing of their corners but what it says of
     /// vertices, and no normals: most scans. [`Self::faces`] and what goes with them are empty then.
     pub triangles: Vec<[u32; 3]>,
-    /// Where these stand in the file, where that is not told by their numbers.
+    /// Where these stand in the file; empty where the line of each is its number.
     pub stretches: Vec<Stretch>,
     pub faces: Vec<Face>,
     pub strokes: Vec<Stroke>,
@@ -90,8 +90,11 @@ impl Stretch {
         Face { line, number, first: first.saturating_add(i.saturating_mul(arity)), ..self.face }
     }
 
-    pub(super) fn faces(&self) -> impl Iterator<Item = Face> {
-        (0..self.count).map(|i| self.face(i))
+    /// All faces of some of them.
+    pub(super) fn all(some: &[Self]) -> Vec<Face> {
+        let mut faces = Vec::with_capacity(some.iter().map(|stretch| stretch.count as usize).sum());
+        some.iter().for_each(|stretch| faces.extend((0..stretch.count).map(|i| stretch.face(i))));
+        faces
     }
 }
 
@@ -129,7 +132,7 @@ impl Geometry {
             let face = Face { run: 0, smoothing: 0, arity: 3, line: 0, number: 0, first: 0 };
             stretches.push(Stretch { face, count: triangles.len() as u32 });
         }
-        self.faces = stretches.iter().flat_map(Stretch::faces).collect();
+        self.faces = Stretch::all(&stretches);
     }
 
     /// Makes every vertex a point; the `i`th has the `i`th normal where there are as many.

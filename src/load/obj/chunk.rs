@@ -95,7 +95,7 @@ impl Corners {
             [vertex, 0, 0] if self.all.is_empty() => self.vertices.push(vertex),
             _ => {
                 if !self.vertices.is_empty() {
-                    self.all.extend(self.vertices.drain(..).map(|vertex| [vertex, 0, 0]));
+                    self.all.extend(std::mem::take(&mut self.vertices).into_iter().map(|vertex| [vertex, 0, 0]));
                 }
                 self.all.push(corner);
             }

@@ -58,25 +58,25 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
     out.geometry = Geometry { soup, names: table.names, runs: table.runs, ..out.geometry };
     match plain {
         Some(triangles) => (out.geometry.triangles, out.geometry.stretches) = (triangles, stretches),
-        None => out.geometry.faces = stretches.iter().flat_map(Stretch::faces).collect(),
+        None => out.geometry.faces = Stretch::all(&stretches),
     }
     Ok(Joined { statements: out, faulty })
 }
 
 /// The faces of all runs of lines, as the whole numbers them.
 fn stretches(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<Stretch> {
-    let mut all: Vec<Stretch> = Vec::new();
+    let mut all: Vec<Stretch> = Vec::with_capacity(chunks.iter().map(|chunk| chunk.faces.len()).sum());
     let mut first = 0;
     for ((chunk, before), runs) in chunks.iter().zip(begins).zip(runs) {
-        for &Stretch { mut face, count } in &chunk.faces {
+        for &Stretch { mut face, count: faces } in &chunk.faces {
             face.first += first;
             face.run = runs[face.run as usize];
             face.line = face.line.saturating_add(before.lines);
             face.number += before.faces;
             face.smoothing = if face.smoothing == OPEN { before.smoothing } else { face.smoothing };
             match all.last_mut() {
-                Some(last) if last.face(last.count) == face => last.count += count,
-                _ => all.push(Stretch { face, count }),
+                Some(last) if last.face(last.count) == face => last.count += faces,
+                _ => all.push(Stretch { face, count: faces }),
             }
         }
         first += count(chunk.corners.len());

@@ -8,7 +8,7 @@
 use super::chunk::{self, Chunk};
 use super::join::{Joined, join};
 use super::{faults, split};
-use crate::load::geometry::{Geometry, LARGEST, Run};
+use crate::load::geometry::{Geometry, LARGEST, Run, Stretch};
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::text::encoding::decode_name;
 use crate::load::wires::Wires;
@@ -140,8 +140,10 @@ fn read_side_by_side(runs: &[&[u8]], budget: &mut Budget) -> Result<Vec<Chunk>, 
 
 /// Bytes that a run takes until it has become a part of a mesh.
 fn bytes(chunk: &Chunk) -> u64 {
-    /// A face, twice, and its number in the mesh.
-    const FACE: u64 = 2 * 24 + 4;
+    /// A face, and its number in the mesh.
+    const FACE: u64 = 24 + 4;
+    /// Twice: in the run of lines and in the whole.
+    const STRETCH: u64 = 2 * size_of::<Stretch>() as u64;
     /// Numbers, indices, those of the mesh, and their vertex.
     const CORNER: u64 = 12 + 12 + 12 + 16;
     /// Twice in `f64`, then in `f32`, and in the mesh.
@@ -160,7 +162,12 @@ fn bytes(chunk: &Chunk) -> u64 {
     // One of its own each may have.
     let materials = chunk.runs.iter().filter(|run| run.material.is_some()).count() * size_of::<Material>();
     let runs = chunk.runs.len() as u64 * RUN + materials as u64;
-    faces as u64 * FACE + corners as u64 * CORNER + vertices as u64 * VERTEX + names + runs
+    faces as u64 * FACE
+        + chunk.faces.len() as u64 * STRETCH
+        + corners as u64 * CORNER
+        + vertices as u64 * VERTEX
+        + names
+        + runs
 }
 
 impl Oddities {
@@ -438,6 +445,14 @@ mod tests {
             assert_eq!(plain.geometry.faces, spelt.geometry.faces, "in runs of {run} bytes");
             assert_eq!(plain.geometry.soup.corners, spelt.geometry.soup.corners, "in runs of {run} bytes");
         }
+    }
+
+    #[test]
+    fn a_line_that_cannot_be_read_after_all_leaves_no_corner() {
+        // What it names besides vertices is seen before what is wrong with it.
+        let s = of(&format!("{TRIANGLE}vt 0 0\nf 1 2 3\nf 3 2 1/1 \\\n1\nf 2 3"));
+        assert_eq!(corners(&s), [[1, 0, 0], [2, 0, 0], [3, 0, 0], [3, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0]]);
+        assert!(fault(&format!("{TRIANGLE}vt 0 0\nf 1 2 3\nf 1 2 3/1 x")).contains("corner 4 of the face is 'x'"));
     }
 
     #[test]

@@ -383,6 +383,41 @@ fn a_table_under_a_glass_is_seen_all_over_a_picture_by_points_and_by_strips_of_t
 }
 
 #[test]
+fn a_hole_in_the_place_of_other_surfaces_changes_nothing_of_what_is_seen_of_them() {
+    let absent = || Material { opacity: 0.4, alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..unlit(Vec3::Y) };
+    let below = |s: &mut Stage, top: f32, material: u32| {
+        s.square(top, 9.0, Material::default()).scene.meshes.last_mut().unwrap().material = material;
+        lower(s, top - 1.0, material);
+    };
+    let painted = |with_hole: bool| {
+        let mut s = aslant(30.0);
+        s.square(0.0, 9.0, Material { opacity: 0.5, alpha_mode: AlphaMode::Blend, ..unlit(Vec3::X) });
+        if with_hole {
+            s.square(0.0, 9.0, absent());
+        }
+        let slab = s.add_material(glass(1.5));
+        below(&mut s, 0.0, slab);
+        s.square(-3.0, 9.0, unlit(Vec3::Z)).color()
+    };
+    assert_eq!((painted(false), painted(true)), (Vec3::new(0.5, 0.0, 0.5), Vec3::new(0.5, 0.0, 0.5)));
+    // Water on glass.
+    let layered = |with_hole: bool| {
+        let mut s = aslant(30.0);
+        let water = s.add_material(clear(1.33, true, Vec3::new(0.1, 0.5, 1.0)));
+        below(&mut s, 1.0, water);
+        if with_hole {
+            s.square(0.0, 9.0, absent());
+        }
+        let slab = s.add_material(clear(1.5, true, Vec3::ZERO));
+        below(&mut s, 0.0, slab);
+        s.square(-3.0, 9.0, unlit(Vec3::ONE)).color()
+    };
+    let seen = layered(false);
+    assert!(seen.x > seen.y && seen.y > seen.z && seen.z > 0.1, "{seen}");
+    assert_eq!(layered(true), seen);
+}
+
+#[test]
 fn what_is_painted_on_glass_is_seen_once_whichever_comes_first_in_the_file() {
     for (label_first, apart) in [(true, 0.0), (false, 0.0), (true, 0.01)] {
         let mut s = aslant(30.0);
