@@ -104,10 +104,13 @@ pub(super) fn grows_with<'a>(batches: &'a [Batch], file: &Path) -> Option<&'a Pa
     let folder = file.file_name().and_then(|_| file.parent())?;
     // Ways through a folder that is not there lead nowhere.
     let leads_back = folder.components().any(|part| part == Component::ParentDir);
-    let whole = |path: &Path| absolute(path).ok().filter(|_| !leads_back);
-    let is_same = |growth: &&Path| *growth == folder || whole(growth).is_some_and(|at| whole(folder) == Some(at));
-    let mut growths = batches.iter().flat_map(|batch| &batch.shots).filter_map(|shot| shot.growth.as_deref());
-    growths.find(is_same)
+    let whole = if leads_back { None } else { absolute(folder).ok() };
+    let is_same = |growth: &&Path| *growth == folder || whole.is_some() && absolute(growth).ok() == whole;
+    let growths = batches.iter().flat_map(|batch| &batch.shots).filter_map(|shot| shot.growth.as_deref());
+    // Pictures of one command mostly go to one.
+    let mut growths: Vec<&Path> = growths.collect();
+    growths.dedup();
+    growths.into_iter().find(is_same)
 }
 
 /// Makes the folder of a picture, if it is one that may be made.

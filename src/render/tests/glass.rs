@@ -400,21 +400,23 @@ fn a_hole_in_the_place_of_other_surfaces_changes_nothing_of_what_is_seen_of_them
         s.square(-3.0, 9.0, unlit(Vec3::Z)).color()
     };
     assert_eq!((painted(false), painted(true)), (Vec3::new(0.5, 0.0, 0.5), Vec3::new(0.5, 0.0, 0.5)));
-    // Water on glass.
-    let layered = |with_hole: bool| {
+    // Water on glass, and holes where they meet, and in the water.
+    let layered = |holes: &[f32]| {
         let mut s = aslant(30.0);
         let water = s.add_material(clear(1.33, true, Vec3::new(0.1, 0.5, 1.0)));
         below(&mut s, 1.0, water);
-        if with_hole {
-            s.square(0.0, 9.0, absent());
+        for &hole in holes {
+            s.square(hole, 9.0, absent());
         }
         let slab = s.add_material(clear(1.5, true, Vec3::ZERO));
         below(&mut s, 0.0, slab);
         s.square(-3.0, 9.0, unlit(Vec3::ONE)).color()
     };
-    let seen = layered(false);
+    let seen = layered(&[]);
     assert!(seen.x > seen.y && seen.y > seen.z && seen.z > 0.1, "{seen}");
-    assert_eq!(layered(true), seen);
+    for holes in [&[0.0][..], &[0.3], &[0.7, 0.0, 0.2]] {
+        assert_eq!(layered(holes), seen, "{holes:?}");
+    }
 }
 
 #[test]
