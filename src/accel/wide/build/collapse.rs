@@ -28,14 +28,13 @@ const NEAR: f32 = 0.15;
 struct Plan {
     /// By one child at most, two, … seven: what all nodes below cost, as areas.
     costs: [f32; LANES - 1],
-    /// Knots below a knot, and itself; 0 of a leaf, that memory may begin as zeros.
+    /// Knots below a knot, and itself; 0 of a leaf.
     knots: u32,
     /// How many of two children, three, … eight, of a node of its own, stand for the first side; 0: one fewer will do.
     shares: [u8; LANES - 1],
 }
 
 impl Plan {
-    /// All zeros, what memory begins as.
     const LEAF: Self = Self { costs: [0.0; LANES - 1], knots: 0, shares: [0; LANES - 1] };
 
     /// Of a knot over two sides; `near` is what a knot below a node adds to what that costs.
@@ -65,8 +64,14 @@ impl Plan {
 /// Plans for a knot, the first, and all below it.
 fn plan(knots: &[Knot], near: f32, plans: &mut [Plan]) {
     let Some(root) = knots.first().filter(|_| knots.len() > PARALLEL) else {
-        for (at, knot) in knots.iter().enumerate().rev().filter(|(_, knot)| !knot.is_leaf()) {
-            plans[at] = Plan::of(knot, near, [&plans[at + 1], &plans[at + knot.at as usize]]);
+        for (at, knot) in knots.iter().enumerate().rev() {
+            // Leaves are written, too: a page that is read first takes two faults, the second of which stops all threads.
+            let is_leaf = knot.is_leaf();
+            plans[at] = if is_leaf {
+                Plan::LEAF
+            } else {
+                Plan::of(knot, near, [&plans[at + 1], &plans[at + knot.at as usize]])
+            };
         }
         return;
     };
