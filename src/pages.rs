@@ -12,11 +12,12 @@
 //! Nor do they where memory must first be fetched: a virtual machine that tells its host of free memory (Linux, free page
 //! reporting) has given away just that of which large pages are made, and gets it back in small pieces. That takes 20 times
 //! as long as to clear it (measured: 4.5 ms a page instead of 0.2), where small pages are made of what was in use before.
-//! So large pages are made one by one, and no more of them once one has taken long.
+//! So large pages are made one by one, and no more of them once those that took long have taken more than [`allow`] says: what
+//! they are worth depends on how many rays will be sent.
 
 use std::fmt;
 use std::ops::{Deref, DerefMut};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use bytemuck::Pod;
@@ -34,8 +35,14 @@ const WORTH_PAGE: usize = PAGE / 2;
 /// A large page is dear if to make it takes the processor longer: twice as long as to make small ones in its place.
 const DEAR: Duration = Duration::from_micros(1500);
 
-/// Whether a large page was dear.
-static ARE_DEAR: AtomicBool = AtomicBool::new(false);
+/// What dear pages may still take, nanoseconds of the processor.
+static ALLOWANCE: AtomicU64 = AtomicU64::new(u64::MAX);
+
+/// Lets large pages that are dear take so much time of the processor from now on, all of them together; before, any.
+pub fn allow(time: Duration) {
+    let nanoseconds = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+    ALLOWANCE.store(nanoseconds.max(1), Ordering::Relaxed);
+}
 
 /// A fixed number of `T`.
 pub struct Paged<T> {
@@ -51,16 +58,10 @@ enum Memory<T> {
 impl<T: Pod> Paged<T> {
     /// So many zeros.
     pub fn zeroed(len: usize) -> Self {
-        let is_worth_it = |bytes: &usize| *bytes >= WORTH_PAGE && !ARE_DEAR.load(Ordering::Relaxed);
-        let large = len.checked_mul(size_of::<T>()).filter(is_worth_it).and_then(|bytes| Large::new(bytes, DEAR));
-        let memory = match large {
-            Some(large) => {
-                ARE_DEAR.fetch_or(large.are_dear, Ordering::Relaxed);
-                Memory::Large(large)
-            }
-            None => Memory::Usual(bytemuck::zeroed_vec(len)),
-        };
-        Self { memory, len }
+        let is_worth_it = |bytes: &usize| *bytes >= WORTH_PAGE && ALLOWANCE.load(Ordering::Relaxed) > 0;
+        let bytes = len.checked_mul(size_of::<T>()).filter(is_worth_it);
+        let large = bytes.and_then(|bytes| Large::new(bytes, DEAR, &ALLOWANCE));
+        Self { memory: large.map_or_else(|| Memory::Usual(bytemuck::zeroed_vec(len)), Memory::Large), len }
     }
 }
 
@@ -69,14 +70,13 @@ struct Large {
     map: MmapMut,
     /// The byte that the first of them begins at.
     start: usize,
-    /// Whether one was dear: all behind it are small.
-    are_dear: bool,
 }
 
 #[cfg(target_os = "linux")]
 impl Large {
-    /// Room for so many bytes, if the system has large pages; one is dear that takes longer to be made than `dear`.
-    fn new(bytes: usize, dear: Duration) -> Option<Self> {
+    /// Room for so many bytes, if the system has large pages. One is dear that takes longer to be made than `dear`; behind the
+    /// one that takes the last of the allowance, pages are small.
+    fn new(bytes: usize, dear: Duration, allowance: &AtomicU64) -> Option<Self> {
         use memmap2::Advice;
         let whole = if bytes % PAGE >= WORTH_PAGE { bytes.checked_next_multiple_of(PAGE)? } else { bytes };
         // Nothing is ever written to what lies before the first large page and behind the last: it takes no memory.
@@ -87,18 +87,27 @@ impl Large {
             let watch = Stopwatch::of_this_thread();
             // The system makes a page when it is written to.
             page[0] = 0;
-            watch.read().cpu > dear
+            let took = watch.read().cpu;
+            took > dear && !spend(allowance, took)
         });
         if are_dear {
             map.advise_range(Advice::NoHugePage, start, whole).ok()?;
         }
-        Some(Self { map, start, are_dear })
+        Some(Self { map, start })
     }
+}
+
+/// Takes some time out of an allowance; whether any is left.
+#[cfg(target_os = "linux")]
+fn spend(allowance: &AtomicU64, time: Duration) -> bool {
+    let nanoseconds = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+    let less = |left: u64| Some(left.saturating_sub(nanoseconds));
+    allowance.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less).is_ok_and(|left| left > nanoseconds)
 }
 
 #[cfg(not(target_os = "linux"))]
 impl Large {
-    fn new(_bytes: usize, _dear: Duration) -> Option<Self> {
+    fn new(_bytes: usize, _dear: Duration, _allowance: &AtomicU64) -> Option<Self> {
         None
     }
 }
@@ -130,7 +139,7 @@ impl<T: Pod> Deref for Paged<T> {
         match &self.memory {
             Memory::Usual(items) => items,
             // From a multiple of a page on, and as long as so many items: no cast can fail.
-            Memory::Large(Large { map, start, .. }) => {
+            Memory::Large(Large { map, start }) => {
                 bytemuck::cast_slice(&map[*start..*start + self.len * size_of::<T>()])
             }
         }
@@ -141,7 +150,7 @@ impl<T: Pod> DerefMut for Paged<T> {
     fn deref_mut(&mut self) -> &mut [T] {
         match &mut self.memory {
             Memory::Usual(items) => items,
-            Memory::Large(Large { map, start, .. }) => {
+            Memory::Large(Large { map, start }) => {
                 bytemuck::cast_slice_mut(&mut map[*start..*start + self.len * size_of::<T>()])
             }
         }
@@ -208,14 +217,16 @@ mod tests {
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn behind_a_page_that_is_dear_all_are_small() {
+    fn where_the_allowance_ends_pages_are_small() {
+        let allowance = AtomicU64::new(1);
         // A kernel without large pages refuses.
-        let Some(mut dear) = Large::new(4 * PAGE, Duration::ZERO) else { return };
-        assert!(dear.are_dear);
+        let Some(mut dear) = Large::new(4 * PAGE, Duration::ZERO, &allowance) else { return };
+        assert_eq!(allowance.load(Ordering::Relaxed), 0);
         dear.map[dear.start..].chunks_mut(4096).for_each(|page| page[0] = 1);
         assert!(kibibytes_in_large_pages(&dear) <= 2048);
-        let Some(cheap) = Large::new(4 * PAGE, Duration::MAX) else { return };
-        assert!(!cheap.are_dear);
+        let allowance = AtomicU64::new(u64::MAX);
+        let Some(cheap) = Large::new(4 * PAGE, Duration::ZERO, &allowance) else { return };
+        assert!((1..u64::MAX).contains(&allowance.load(Ordering::Relaxed)));
         let [made, granted] = [&cheap, &dear].map(kibibytes_in_large_pages);
         assert!(made == 4 * 2048 || granted == 0, "{made} where {granted} were granted");
     }

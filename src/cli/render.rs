@@ -16,13 +16,14 @@ use super::{again, fresh, interrupt, lanes, read, surroundings, unseen};
 use crate::image::destination;
 use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::number::so_many;
-use crate::render::{Moved, World};
-use crate::scene::Scene;
+use crate::pages;
+use crate::render::{Moved, Sampling, World};
 use crate::scene::framing::{Bounds, robust_bounds_within};
+use crate::scene::{RenderHints, Scene};
 use crate::threads;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Does the whole job and tells how it ended: as its worst picture.
 pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
@@ -33,6 +34,7 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
             return Exit::Failed;
         }
     };
+    pages::allow(for_large_pages(job));
     let sources = Sources::of(job.batches.iter().flat_map(|b| &b.inputs));
     let mut so_far = SoFar::new(sources);
     // A picture that is repeated may be replaced by its repetition, but by nothing else.
@@ -113,6 +115,24 @@ impl SoFar {
         self.foretold.extend(one.foretold);
         self.unseen.extend(one.unseen);
     }
+}
+
+/// What large pages may take that are dear: about a hundredth of what the pictures will.
+fn for_large_pages(job: &RenderJob) -> Duration {
+    /// Nanoseconds; a sample takes some hundreds.
+    const OF_SAMPLE: u64 = 3;
+    /// Samples of a pixel where errors decide; most need fewer.
+    const SAMPLES: u32 = 8;
+    let Ok(Effective { settings, .. }) = Effective::new(&job.look, &RenderHints::default()) else {
+        return Duration::MAX;
+    };
+    let samples = match settings.sampling {
+        Sampling::Stochastic(how) => how.min_samples.max(SAMPLES),
+        Sampling::Adaptive(_) | Sampling::Uniform => settings.samples,
+    };
+    let pictures = job.batches.iter().map(|batch| batch.shots.len() as u64).sum::<u64>();
+    let pixels = u64::from(settings.width) * u64::from(settings.height);
+    Duration::from_nanos([pictures, u64::from(samples), OF_SAMPLE].into_iter().fold(pixels, u64::saturating_mul))
 }
 
 /// Prints or writes the statistics, if there are any, but never over what a model was read from.

@@ -88,13 +88,13 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
     if is_stl_text(text) {
         return Ok(Format::Stl(Encoding::Text));
     }
-    if let Some((_, kind)) = FOREIGN.iter().find(|(start, _)| bytes.starts_with(start)) {
+    if let Some(kind) = by_beginning(bytes) {
         // Some kinds are archives of a certain content.
         let inner = FOREIGN_EXTENSIONS.iter().find(|(ending, _)| *ending == extension && ZIPPED.contains(ending));
         return Err(foreign(source, inner.filter(|_| bytes.starts_with(ZIP)).map_or(kind, |(_, kind)| kind)));
     }
-    if text.starts_with(b"<") {
-        return Err(foreign(source, if has(text, b"<COLLADA") { "a COLLADA file" } else { "an XML or HTML file" }));
+    if let Some(kind) = marked_up(text) {
+        return Err(foreign(source, kind));
     }
     match extension.as_str() {
         "gltf" | "glb" => return Ok(Format::Gltf),
@@ -112,6 +112,20 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
         return Err(foreign(source, kind));
     }
     by_lines(text).ok_or_else(|| foreign(source, if bytes.is_empty() { "empty" } else { "of an unknown kind" }))
+}
+
+/// What a file is that should hold lines of words and numbers; `None` where it may be that.
+pub(super) fn other_than_text(bytes: &[u8]) -> Option<&'static str> {
+    let bytes = without_mark(bytes);
+    by_beginning(bytes).or_else(|| marked_up(bytes.trim_ascii_start()))
+}
+
+fn by_beginning(bytes: &[u8]) -> Option<&'static str> {
+    FOREIGN.iter().find(|(start, _)| bytes.starts_with(start)).map(|(_, kind)| *kind)
+}
+
+fn marked_up(text: &[u8]) -> Option<&'static str> {
+    text.starts_with(b"<").then(|| if has(text, b"<COLLADA") { "a COLLADA file" } else { "an XML or HTML file" })
 }
 
 /// Whether a file has a name as models have: one that ends in `.glb`, `.gltf`, `.vrm` (avatars in GLB), `.obj`, `.ply`, `.stl` or

@@ -10,7 +10,7 @@ use crate::math::frame::{half_of, spread};
 use crate::scene::{Mesh, UpAxis};
 
 /// Programs that write +Z unless told otherwise, as their comments name them, in lower case.
-const Z_WRITERS: [&str; 13] = [
+const Z_WRITERS: [&str; 14] = [
     "freecad",
     "openscad",
     "tinkercad",
@@ -24,6 +24,7 @@ const Z_WRITERS: [&str; 13] = [
     "realitycapture",
     "pix4d",
     "qgis",
+    "ifcopenshell",
 ];
 
 /// The up axis of an OBJ that gives no sign.

@@ -182,6 +182,9 @@ impl<'a> Reader<'a> {
 
     /// Reads scalars of unsigned integers, all of them.
     pub(super) fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, Unreadable> {
+        if let Some(decoded) = self.decoded.indices(index.value()) {
+            return Ok(decoded.to_vec());
+        }
         let packed = |component| self.packed(index, |format| format.component == component && format.width() == 1);
         if let Some(bytes) = packed(ComponentType::U32) {
             return Ok(bytes.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect());
@@ -197,20 +200,21 @@ impl<'a> Reader<'a> {
         let accessor = self.root.accessors.get(index.value()).filter(|accessor| accessor.sparse.is_none())?;
         let format = Format::of(accessor).filter(|format| is_wanted(*format))?;
         let run = self.run(index, accessor, format).ok()??;
-        let bytes = usize::try_from(accessor.count.0).ok()?.checked_mul(format.size())?;
+        let bytes = usize::try_from(self.count(index)).ok()?.checked_mul(format.size())?;
         run.bytes.get(..bytes).filter(|_| run.stride == format.size())
     }
 
-    /// How many elements an accessor declares.
+    /// How many elements an accessor has: as many as were decoded, or it declares.
     pub(super) fn count(&self, index: Index<Accessor>) -> u64 {
-        self.root.accessors.get(index.value()).map_or(0, |accessor| accessor.count.0)
+        let declared = || self.root.accessors.get(index.value()).map_or(0, |accessor| accessor.count.0);
+        self.decoded.count(index.value()).unwrap_or_else(declared)
     }
 
     /// Whether an accessor holds only zeros, because the file has nothing for it.
     pub(super) fn is_blank(&self, index: Index<Accessor>) -> bool {
         let accessor = self.root.accessors.get(index.value());
         let nowhere = accessor.is_some_and(|a| a.buffer_view.is_none() && a.sparse.is_none());
-        nowhere && self.decoded.of(index.value()).is_none()
+        nowhere && self.decoded.count(index.value()).is_none()
     }
 
     /// The smallest and largest value of each component, not normalised, numbers that are not finite left out.
@@ -222,7 +226,7 @@ impl<'a> Reader<'a> {
         const SMALL: u64 = 1 << 16;
         let accessor = self.root.accessors.get(index.value())?;
         let format = Format::of(accessor)?;
-        if self.decoded.of(index.value()).is_some() {
+        if self.decoded.count(index.value()).is_some() {
             return None;
         }
         match (&accessor.sparse, accessor.buffer_view) {
@@ -252,7 +256,7 @@ impl<'a> Reader<'a> {
     ) -> Result<Vec<T>, Unreadable> {
         let accessor = self.root.accessors.get(index.value()).ok_or(Unreadable::Unknown)?;
         let format = Format::of(accessor).ok_or(Unreadable::Unknown)?;
-        let count = usize::try_from(accessor.count.0).map_err(|_| Unreadable::Unknown)?;
+        let count = usize::try_from(self.count(index)).map_err(|_| Unreadable::Unknown)?;
         let wanted = match pick {
             Pick::All => count,
             Pick::Only(list) => list.len(),
@@ -289,7 +293,7 @@ impl<'a> Reader<'a> {
 
     /// Where the elements of an accessor lie; `None`: nowhere, they are zeros.
     fn run(&self, index: Index<Accessor>, accessor: &Accessor, format: Format) -> Result<Option<Run<'a>>, Unreadable> {
-        if let Some(bytes) = self.decoded.of(index.value()) {
+        if let Some(bytes) = self.decoded.values(index.value()) {
             return Ok(Some(Run { bytes, stride: format.size(), format }));
         }
         accessor.buffer_view.map(|view| self.view(view, accessor, format)).transpose()

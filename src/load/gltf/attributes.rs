@@ -94,7 +94,8 @@ impl<'a> Check<'a> {
             );
         }
         self.sets(attributes, &at);
-        let mut vertices = None;
+        let position = attributes.get("POSITION").and_then(|index| self.shape(index));
+        let mut vertices = position.map(|shape| shape.count);
         for (name, index) in attributes {
             let place = format!("{at}.{}", crate::load::paths::shorten(name));
             let Some(shape) = self.shape(index) else { continue };
@@ -102,7 +103,7 @@ impl<'a> Check<'a> {
             match vertices {
                 None => vertices = Some(shape.count),
                 Some(count) if count != shape.count => {
-                    let text = format!("{} elements where other attributes have {count}", shape.count);
+                    let text = format!("{} elements for {count} vertices", shape.count);
                     self.report.add(Code::MeshPrimitiveUnequalAccessorCount, place, text);
                 }
                 Some(_) => {}

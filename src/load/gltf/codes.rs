@@ -5,7 +5,8 @@
 //! can be left out; **accept** in silence what changes nothing. Faults in animations are at most warned about, because
 //! nodes that they do not move can be drawn at rest, and so are those in images, because a material can be drawn without a
 //! map, in cameras, because there is always another view, and in the bounds that accessors declare, because nothing is
-//! drawn from them ([`Code::verdict_at`]).
+//! drawn from them ([`Code::verdict_at`]). Of materials, textures, samplers and lights what breaks the schema is left out
+//! (`mend`).
 
 use std::sync::LazyLock;
 
@@ -54,8 +55,8 @@ codes! {
     GlbLengthMismatch "GLB_LENGTH_MISMATCH" Warn "the chunks themselves say whether they are whole";
     GlbUnexpectedEndOfHeader "GLB_UNEXPECTED_END_OF_HEADER" Refuse "the file was cut off";
     GlbUnexpectedEndOfChunkHeader "GLB_UNEXPECTED_END_OF_CHUNK_HEADER" Refuse "the file was cut off";
-    GlbUnexpectedEndOfChunkData "GLB_UNEXPECTED_END_OF_CHUNK_DATA" Refuse "the file was cut off";
-    GlbChunkTooBig "GLB_CHUNK_TOO_BIG" Refuse "where the chunk ends is unknown";
+    GlbUnexpectedEndOfChunkData "GLB_UNEXPECTED_END_OF_CHUNK_DATA" Refuse "the JSON was cut off; of binary data what is there is read";
+    GlbChunkTooBig "GLB_CHUNK_TOO_BIG" Refuse "where the JSON ends is unknown; of binary data what is there is read";
     GlbChunkLengthUnaligned "GLB_CHUNK_LENGTH_UNALIGNED" Warn "the chunk can be read as it is";
     GlbEmptyChunk "GLB_EMPTY_CHUNK" Warn "an empty chunk holds nothing to miss";
     GlbEmptyBinChunk "GLB_EMPTY_BIN_CHUNK" Accept "an empty chunk holds nothing to miss";
@@ -130,7 +131,7 @@ codes! {
     // Data of meshes.
     AccessorInvalidFloat "ACCESSOR_INVALID_FLOAT" Warn "faces with such corners are left out";
     AccessorIndexOob "ACCESSOR_INDEX_OOB" Refuse "most often the sign of a wrong or damaged buffer";
-    AccessorIndexPrimitiveRestart "ACCESSOR_INDEX_PRIMITIVE_RESTART" Refuse "forbidden, and no vertex has that index";
+    AccessorIndexPrimitiveRestart "ACCESSOR_INDEX_PRIMITIVE_RESTART" Refuse "no vertex has that index; where one has, it is drawn with a warning";
     AccessorIndexTriangleDegenerate "ACCESSOR_INDEX_TRIANGLE_DEGENERATE" Accept "told as dropped faces";
     AccessorVector3NonUnit "ACCESSOR_VECTOR3_NON_UNIT" Warn "normals and tangents are made unit";
     AccessorInvalidSign "ACCESSOR_INVALID_SIGN" Warn "only the sign of w counts";
@@ -166,7 +167,7 @@ codes! {
     MeshPrimitiveGeneratedTangentSpace "MESH_PRIMITIVE_GENERATED_TANGENT_SPACE" Accept "MikkTSpace is what the format asks for";
     MeshPrimitiveNoTangentSpace "MESH_PRIMITIVE_NO_TANGENT_SPACE" Warn "they are made from its texture coordinates";
     MeshPrimitiveTooFewTexcoords "MESH_PRIMITIVE_TOO_FEW_TEXCOORDS" Warn "the map is read at (0, 0)";
-    MeshPrimitiveUnequalAccessorCount "MESH_PRIMITIVE_UNEQUAL_ACCESSOR_COUNT" Refuse "which values belong together is unknown";
+    MeshPrimitiveUnequalAccessorCount "MESH_PRIMITIVE_UNEQUAL_ACCESSOR_COUNT" Warn "the attribute is left out";
     MeshPrimitivesUnequalTargetsCount "MESH_PRIMITIVES_UNEQUAL_TARGETS_COUNT" Warn "targets that are missing change nothing";
     UnusedMeshTangent "UNUSED_MESH_TANGENT" Accept "not read";
     UnusedMeshWeights "UNUSED_MESH_WEIGHTS" Accept "the node's weights count";
@@ -262,6 +263,12 @@ impl Code {
             verdict => verdict,
         }
     }
+}
+
+/// Whether a place is in a material, a texture, a sampler or a light, or a name: these can do without what is broken in them.
+pub(super) fn can_be_left_out(place: &str) -> bool {
+    let looks = ["materials[", "textures[", "samplers["].iter().any(|list| place.starts_with(list));
+    looks || place.contains("extensions.KHR_lights_punctual") || place.ends_with(".name")
 }
 
 /// Whether a place is in the bounds that an accessor declares: `accessors[3].min[0]`.

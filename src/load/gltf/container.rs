@@ -68,15 +68,16 @@ fn split_glb<'a>(bytes: &'a [u8], report: &mut Report) -> Option<(&'a [u8], Opti
         Ordering::Less => report.add(Code::GlbExtraData, "", text),
         Ordering::Equal => {}
     }
-    let missing = length.saturating_sub(bytes.len());
-    chunks(bytes.get(HEADER..length.min(bytes.len())).unwrap_or_default(), missing, report)
+    chunks(bytes.get(HEADER..).unwrap_or_default(), length - HEADER, report)
 }
 
-/// Walks the chunks behind the header; `missing` bytes are declared after the end of the file.
-fn chunks<'a>(mut rest: &'a [u8], missing: usize, report: &mut Report) -> Option<(&'a [u8], Option<&'a [u8]>)> {
+/// Walks the chunks behind the header that begin in the bytes that it declares; the last may end behind these.
+fn chunks<'a>(bytes: &'a [u8], declared: usize, report: &mut Report) -> Option<(&'a [u8], Option<&'a [u8]>)> {
     let (mut json, mut bin) = (None, None);
+    let mut rest = bytes;
     for number in 0.. {
-        if rest.is_empty() {
+        let at = bytes.len() - rest.len();
+        if rest.is_empty() || at >= declared {
             break;
         }
         let place = format!("chunk {number}");
@@ -97,18 +98,24 @@ fn chunks<'a>(mut rest: &'a [u8], missing: usize, report: &mut Report) -> Option
             report.add(Code::GlbUnexpectedFirstChunk, place, format!("its type is {kind:#010x}, not JSON"));
             return None;
         }
-        let Some(data) = rest.get(8..length.saturating_add(8)) else {
-            let there = rest.len() - 8;
-            if length <= there.saturating_add(missing) {
+        let (there, room) = (rest.len() - 8, declared.saturating_sub(at + 8));
+        if length > there.min(room) {
+            let (code, text) = if length <= room {
                 let text = format!("it should have {length} bytes, only {there} are there; the file was cut off");
-                report.add(Code::GlbUnexpectedEndOfChunkData, place, text);
+                (Code::GlbUnexpectedEndOfChunkData, text)
             } else {
-                let text = format!("it should have {length} bytes, the header leaves room for {}", there + missing);
-                report.add(Code::GlbChunkTooBig, place, text);
+                let text = format!("it should have {length} bytes, the header leaves room for {room}");
+                (Code::GlbChunkTooBig, text)
+            };
+            // Whether what is missing is needed shows when it is read.
+            if number == 0 {
+                report.add(code, place, text);
+                return None;
             }
-            return None;
-        };
-        rest = rest.get(8 + length..).unwrap_or_default();
+            report.warn(code, &place, text);
+        }
+        let (data, behind) = rest[8..].split_at(length.min(there));
+        rest = behind;
         check_chunk(kind, length, number, &place, report);
         let slot = match kind {
             JSON => &mut json,
@@ -182,8 +189,8 @@ mod tests {
         let whole = glb(&[(b"JSON", b"{}  "), (b"BIN\0", b"1234")]);
         for length in 0..whole.len() {
             let (parts, names) = split_all(&whole[..length]);
-            // Cut between the two chunks, the JSON is still whole.
-            assert_eq!(parts.is_some(), length == 24, "{length}");
+            // Cut between the two chunks, or in the data of the second, the JSON is still whole.
+            assert_eq!(parts.is_some(), length == 24 || length >= 32, "{length}");
             assert!(!names.is_empty(), "{length}");
         }
     }

@@ -12,7 +12,7 @@ use super::report::Report;
 use super::schema::whole;
 use crate::load::Diagnostic;
 use crate::load::limits::Budget;
-use gltf::json::accessor::{Accessor, ComponentType, Type};
+use gltf::json::accessor::{Accessor, Type};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
@@ -26,9 +26,13 @@ const NAME: &str = "KHR_draco_mesh_compression";
 /// What to do about a file that cannot be read as it is.
 const REMEDY: &str = "get the file again, or export it without Draco compression";
 
-/// The decoded bytes of accessors, packed, in the type that each accessor declares.
+/// What accessors show of streams.
 #[derive(Default)]
-pub(super) struct Decoded(HashMap<usize, Vec<u8>>);
+pub(super) struct Decoded {
+    /// Values of vertices, packed, in the type that each accessor declares, and how many there are.
+    values: HashMap<usize, (Vec<u8>, u64)>,
+    indices: HashMap<usize, Vec<u32>>,
+}
 
 impl Decoded {
     /// Decodes every compressed primitive, in parallel, within `budget`.
@@ -52,26 +56,42 @@ impl Decoded {
         let mut decoded = Self::default();
         for (output, plan) in outputs {
             match output {
-                Ok(output) => decoded.keep(plan, output),
+                Ok(output) => {
+                    plan.compare(&output, report);
+                    decoded.keep(plan, output);
+                }
                 Err(text) => plan.task.failed(plan.task.fault("", text), report),
             }
         }
         decoded
     }
 
-    /// The values of an accessor, if it was decoded.
-    pub(super) fn of(&self, accessor: usize) -> Option<&[u8]> {
-        self.0.get(&accessor).map(Vec::as_slice)
+    /// The values of vertices that an accessor shows, if they were decoded.
+    pub(super) fn values(&self, accessor: usize) -> Option<&[u8]> {
+        self.values.get(&accessor).map(|(bytes, _)| bytes.as_slice())
+    }
+
+    /// The corners of triangles that an accessor shows, if they were decoded.
+    pub(super) fn indices(&self, accessor: usize) -> Option<&[u32]> {
+        self.indices.get(&accessor).map(Vec::as_slice)
+    }
+
+    /// How many elements an accessor shows, if they were decoded.
+    pub(super) fn count(&self, accessor: usize) -> Option<u64> {
+        let values = self.values.get(&accessor).map(|&(_, count)| count);
+        values.or_else(|| self.indices(accessor).map(|corners| corners.len() as u64))
     }
 
     /// Bytes that were decoded.
     pub(super) fn len(&self) -> u64 {
-        self.0.values().map(|bytes| bytes.len() as u64).sum()
+        let values: u64 = self.values.values().map(|(bytes, _)| bytes.len() as u64).sum();
+        values + self.indices.values().map(|corners| 4 * corners.len() as u64).sum::<u64>()
     }
 
     fn keep(&mut self, plan: Plan, output: Output) {
-        self.0.insert(plan.indices, output.indices);
-        self.0.extend(plan.accessors.into_iter().zip(output.attributes));
+        self.indices.insert(plan.indices.0, output.indices);
+        let counted = output.attributes.into_iter().map(|bytes| (bytes, output.vertices));
+        self.values.extend(plan.accessors.into_iter().zip(counted));
     }
 }
 
@@ -95,12 +115,12 @@ struct Task<'a> {
 struct Plan<'a> {
     task: Task<'a>,
     bytes: &'a [u8],
-    /// The accessor of the indices, and how these are kept.
-    indices: usize,
-    index_type: ComponentType,
-    /// The accessors of the attributes, and what is wanted of each.
+    /// The accessor of the indices, and how many it declares.
+    indices: (usize, u64),
+    /// The accessors of the attributes, what is wanted of each, and how many values they declare.
     accessors: Vec<usize>,
     wanted: Vec<Wanted>,
+    declared: u64,
 }
 
 /// What an accessor shows: the number of a compressed view, and in its stream an attribute, or the indices (`None`).
@@ -111,19 +131,20 @@ impl<'a> Task<'a> {
     /// the same.
     fn plan(&self, owners: &mut HashMap<usize, Part>, budget: &mut Budget) -> Result<Option<Plan<'a>>, Diagnostic> {
         let (view, bytes) = self.stream()?;
-        let (indices, index_type, corners) = self.indices()?;
-        let (accessors, wanted) = self.attributes();
+        let indices = self.indices()?;
+        let (accessors, mut wanted) = self.attributes();
         let shown = accessors.iter().zip(&wanted).map(|(&accessor, w)| (accessor, (view, Some(w.id))));
-        if !self.claim(shown.chain([(indices, (view, None))]).collect(), owners)? {
+        if !self.claim(shown.chain([(indices.0, (view, None))]).collect(), owners)? {
             return Ok(None);
         }
         let (counts, ..) = draco_stream::start(bytes).map_err(|text| self.fault("", text))?;
-        let vertices = wanted.first().map_or(0, |w| w.count);
-        counts.agree(corners, vertices).map_err(|text| self.fault("", text))?;
-        let kept = wanted.iter().map(Wanted::size).fold(corners.saturating_mul(4), u64::saturating_add);
-        self.charge(counts.cost(vertices, (wanted.len() + draco_codec::SPARE) as u64).saturating_add(kept), budget)?;
+        let declared = wanted.first().map_or(0, |w| w.most);
+        let most = counts.most_values(declared);
+        wanted.iter_mut().for_each(|w| w.most = most);
+        let kept = wanted.iter().map(Wanted::size).fold(counts.faces.saturating_mul(12), u64::saturating_add);
+        self.charge(counts.cost(most, (wanted.len() + draco_codec::SPARE) as u64).saturating_add(kept), budget)?;
         let task = Task { place: self.place.clone(), ..*self };
-        Ok(Some(Plan { task, bytes, indices, index_type, accessors, wanted }))
+        Ok(Some(Plan { task, bytes, indices, accessors, wanted, declared }))
     }
 
     /// Notes what each accessor shows; `false`: all of it was noted before.
@@ -160,15 +181,15 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// The accessor of the indices, their type and their number.
-    fn indices(&self) -> Result<(usize, ComponentType, u64), Diagnostic> {
+    /// The accessor of the indices and how many it declares.
+    fn indices(&self) -> Result<(usize, u64), Diagnostic> {
         let Checked::Valid(Mode::Triangles) = self.primitive.mode else {
             return Err(self.fault("", "only triangles can be decoded, and the primitive has another mode"));
         };
         let index = self.primitive.indices.ok_or_else(|| self.fault("", "the primitive has no indices"))?.value();
         let accessor = self.root.accessors.get(index);
         match accessor.and_then(|accessor| Some((Format::of(accessor)?, accessor.count.0))) {
-            Some((Format { component, shape: Type::Scalar, .. }, count)) => Ok((index, component, count)),
+            Some((Format { shape: Type::Scalar, .. }, count)) => Ok((index, count)),
             _ => Err(self.fault("", "the accessor of its indices has an unknown type")),
         }
     }
@@ -183,7 +204,7 @@ impl<'a> Task<'a> {
             let accessor = self.root.accessors.get(index.value())?;
             let format = Format::of(accessor)?;
             let (component, width) = (format.component, format.width());
-            Some((index.value(), Wanted { id, name, component, width, count: accessor.count.0 }))
+            Some((index.value(), Wanted { id, name, component, width, most: accessor.count.0 }))
         };
         self.primitive.attributes.iter().filter_map(attribute).unzip()
     }
@@ -207,6 +228,20 @@ impl<'a> Task<'a> {
 
 impl Plan<'_> {
     fn run(&self) -> Result<Output, String> {
-        draco_codec::decode(self.bytes, self.index_type, &self.wanted)
+        draco_codec::decode(self.bytes, &self.wanted)
+    }
+
+    /// Tells where the accessors declare other numbers than the stream has.
+    fn compare(&self, output: &Output, report: &mut Report) {
+        let (corners, vertices) = (output.indices.len() as u64, output.vertices);
+        if (corners, vertices) != (self.indices.1, self.declared) {
+            let Diagnostic { file, place, .. } = self.task.fault("", "");
+            let text = format!(
+                "the stream has {vertices} vertices and {corners} indices, but the accessors declare {} and {}",
+                self.declared, self.indices.1
+            );
+            let warning = Diagnostic::new("gltf-draco-count", file, place, text);
+            report.warnings.push(warning.remedy("those of the stream are drawn"));
+        }
     }
 }

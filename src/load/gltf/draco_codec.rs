@@ -16,37 +16,39 @@ pub(super) struct Wanted {
     pub(super) component: ComponentType,
     /// Components of a value.
     pub(super) width: usize,
-    /// Values.
-    pub(super) count: u64,
+    /// Values at most.
+    pub(super) most: u64,
 }
 
 impl Wanted {
-    /// Bytes of all values.
+    /// Bytes of all values at most.
     pub(super) fn size(&self) -> u64 {
-        self.count.saturating_mul((self.width * self.component.size()) as u64)
+        self.most.saturating_mul((self.width * self.component.size()) as u64)
     }
 }
 
 /// What a stream decoded to.
 pub(super) struct Output {
-    /// Corners of triangles, packed, in the type that was asked for.
-    pub(super) indices: Vec<u8>,
+    /// Corners of triangles.
+    pub(super) indices: Vec<u32>,
+    /// Values of each attribute.
+    pub(super) vertices: u64,
     /// For each attribute that was wanted, the values of all vertices, packed.
     pub(super) attributes: Vec<Vec<u8>>,
 }
 
-/// Decodes a stream whose [`super::draco_stream::Counts`] agree with what is wanted.
+/// Decodes a stream that has no more values than are wanted at most.
 ///
 /// # Errors
 /// What is wrong with the stream, or what it does not have.
 #[cfg(feature = "draco")]
-pub(super) fn decode(stream: &[u8], indices: ComponentType, wanted: &[Wanted]) -> Result<Output, String> {
-    decoder::decode(stream, indices, wanted)
+pub(super) fn decode(stream: &[u8], wanted: &[Wanted]) -> Result<Output, String> {
+    decoder::decode(stream, wanted)
 }
 
 /// Without the library, says so.
 #[cfg(not(feature = "draco"))]
-pub(super) fn decode(_: &[u8], _: ComponentType, _: &[Wanted]) -> Result<Output, String> {
+pub(super) fn decode(_: &[u8], _: &[Wanted]) -> Result<Output, String> {
     Err("this meshray was built without the feature 'draco'".into())
 }
 
@@ -63,7 +65,7 @@ mod decoder {
     use draco_oxide_decoder::Err as Failure;
     use draco_oxide_decoder::connectivity::Connectivity;
 
-    pub(super) fn decode(stream: &[u8], indices: ComponentType, wanted: &[Wanted]) -> Result<Output, String> {
+    pub(super) fn decode(stream: &[u8], wanted: &[Wanted]) -> Result<Output, String> {
         let decoded = attempt(|| mesh(stream, wanted));
         let damaged = || String::from("the stream cannot be decoded: it is damaged");
         let (mesh, corners, points) = decoded.unwrap_or_else(|| Err(damaged()))?;
@@ -84,13 +86,14 @@ mod decoder {
             let values = chosen.ok_or_else(lost).and_then(|places| values.convert(&places, wanted));
             values.map_err(|why| format!("{}: {why}", wanted.name))
         };
-        let attributes = wanted.iter().map(attribute).collect::<Result<_, _>>()?;
-        let mut bytes = Vec::with_capacity(corners.len() * indices.size());
-        for corner in corners {
-            let corner = points.as_ref().map_or(corner, |points| points.number[corner as usize]);
-            write(Number::Whole(corner.into()), indices, &mut bytes)?;
+        let attributes: Vec<(Vec<u8>, usize)> = wanted.iter().map(attribute).collect::<Result<_, _>>()?;
+        let vertices = attributes.first().map_or(0, |&(_, count)| count);
+        if attributes.iter().any(|&(_, count)| count != vertices) {
+            return Err(lost());
         }
-        Ok(Output { indices: bytes, attributes })
+        let number = |corner: u32| points.as_ref().map_or(corner, |points| points.number[corner as usize]);
+        let attributes = attributes.into_iter().map(|(bytes, _)| bytes).collect();
+        Ok(Output { indices: corners.into_iter().map(number).collect(), vertices: vertices as u64, attributes })
     }
 
     /// The mesh as the library has it, the point of each corner, and how the format numbers points if not like it.
@@ -140,14 +143,14 @@ mod decoder {
     }
 
     impl Values<'_> {
-        /// The value of every vertex, which are found at `places`, in the type that is wanted.
-        fn convert(&self, places: &[u32], w: &Wanted) -> Result<Vec<u8>, String> {
+        /// The value of every vertex, which are found at `places`, in the type that is wanted, and how many there are.
+        fn convert(&self, places: &[u32], w: &Wanted) -> Result<(Vec<u8>, usize), String> {
             let count = places.len();
             if self.width != w.width {
                 return Err(format!("{} components in the stream, {} in the accessor", self.width, w.width));
             }
-            if count as u64 != w.count {
-                return Err(format!("{count} values in the stream, {} in the accessor", w.count));
+            if count as u64 > w.most {
+                return Err(format!("{count} values in the stream, where {} are possible", w.most));
             }
             let size = self.size()?;
             // The library keeps values as the machine does, files keep the lowest byte first.
@@ -165,7 +168,7 @@ mod decoder {
                     write(self.number(component), w.component, &mut out)?;
                 }
             }
-            Ok(out)
+            Ok((out, count))
         }
 
         /// Bytes of a component.

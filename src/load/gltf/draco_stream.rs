@@ -15,19 +15,15 @@ pub(super) struct Counts {
 }
 
 impl Counts {
-    /// Checks them against the accessors.
-    ///
-    /// # Errors
-    /// Which of them disagrees.
-    pub(super) fn agree(&self, corners: u64, vertices: u64) -> Result<(), String> {
-        let Self { faces, vertices: own, final_vertices } = *self;
-        if faces.checked_mul(3) != Some(corners) {
-            return Err(format!("the stream has {faces} triangles, but the accessor declares {corners} indices"));
+    /// Values of an attribute at most, where accessors declare so many: several encoders declare a few too many or too few.
+    pub(super) fn most_values(&self, declared: u64) -> u64 {
+        if self.final_vertices {
+            return self.vertices;
         }
-        if own > vertices || (final_vertices && own != vertices) {
-            return Err(format!("the stream has {own} vertices, but the accessors declare {vertices}"));
-        }
-        Ok(())
+        let known = self.vertices.max(declared);
+        let most = known.saturating_add(known / 4 + 64);
+        // No more than one for each corner.
+        most.min(self.faces.saturating_mul(3)).max(self.vertices)
     }
 
     /// Bytes that decoding into so many vertices with so many attributes takes for a while.

@@ -31,7 +31,7 @@ pub(super) struct Survey {
 /// What is wrong with it.
 pub(super) fn check(stream: &[u8], wanted: &[Wanted]) -> Result<Survey, String> {
     let (counts, method, cursor) = start(stream)?;
-    let most = wanted.iter().map(|w| w.count).max().unwrap_or(0);
+    let most = wanted.iter().map(|w| w.most).max().unwrap_or(0);
     let mut walk = Walk { cursor, most };
     let (sizes, connectivity) = match method {
         Method::Sequential => {
@@ -187,7 +187,7 @@ impl Walk<'_> {
     /// The encoded values of an attribute.
     fn values(&mut self, attribute: &Attribute, count: u64) -> Result<(), String> {
         if count > self.most {
-            return Err(format!("the stream has {count} values of an attribute, the accessors declare {}", self.most));
+            return Err(many("values of an attribute", count, self.most));
         }
         let width = if attribute.form == 3 { 2 } else { u64::from(attribute.width) };
         if attribute.form == 0 {

@@ -6,16 +6,18 @@ use super::gloss;
 use super::report::Report;
 use super::textures::Picture;
 use crate::load::limits::{Budget, Limits, OverBudget};
-use crate::load::paths::Resolver;
+use crate::load::mtl::Finder;
+use crate::load::paths::{Resolver, taken_from};
 use crate::load::texture::{Encoded, Unusable, decode_all, format_of, take_memory};
 use crate::load::{Diagnostic, ktx};
 use crate::scene::{Bitmap, Pixels};
 use crate::stopwatch::Spent;
 use ::image::ImageFormat;
 use gltf::json::{Index, Root, image::Image, texture::Texture};
+use percent_encoding::percent_decode_str;
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The bytes of every image that is drawn or lies in the file itself.
 pub(super) struct Images<'a> {
@@ -38,6 +40,7 @@ impl<'a> Images<'a> {
         let mut images = Self { bytes: Vec::new(), same: HashMap::new() };
         let drawn: HashSet<usize> = drawn.iter().map(|picture| picture.image).collect();
         let mut known: HashMap<&str, usize> = HashMap::new();
+        let mut missed = 0;
         for (i, image) in root.images.iter().enumerate() {
             let named = image.uri.as_deref().filter(|uri| !is_data(uri));
             let drawn = drawn.contains(&i);
@@ -45,7 +48,7 @@ impl<'a> Images<'a> {
                 images.same.insert(i, other);
                 images.bytes.push(None);
             } else {
-                let mut find = Find { buffers, file, resolver, budget, report, drawn };
+                let mut find = Find { buffers, file, resolver, budget, report, drawn, missed: &mut missed };
                 images.bytes.push(find.bytes(i, image));
                 // What was looked for once is not looked for again, found or not.
                 known.extend(named.filter(|_| is_wanted(image, drawn)).map(|uri| (uri, i)));
@@ -121,6 +124,8 @@ struct Find<'a, 'b> {
     budget: &'b mut Budget,
     report: &'b mut Report,
     drawn: bool,
+    /// Names that were found nowhere.
+    missed: &'b mut usize,
 }
 
 impl<'a> Find<'a, '_> {
@@ -150,11 +155,32 @@ impl<'a> Find<'a, '_> {
                 self.leave_out(i, over);
                 None
             }
-            Err(why) => {
-                self.report.warnings.push(why.diagnose(self.file, &place));
-                None
-            }
+            Err(why) => match self.elsewhere(uri) {
+                Some(path) => {
+                    let text = taken_from(uri, &path);
+                    self.report.warnings.push(Diagnostic::new("file-elsewhere", self.file, &place, text));
+                    let read = self.resolver.read_file_within(&path, self.budget).ok()?;
+                    read.map_err(|over| self.leave_out(i, over)).ok()
+                }
+                None => {
+                    self.report.warnings.push(why.diagnose(self.file, &place));
+                    None
+                }
+            },
         }
+    }
+
+    /// Where a picture lies that its name does not lead to: the name is often that of another machine. Nothing is looked for
+    /// in place of what is on the net.
+    fn elsewhere(&mut self, uri: &str) -> Option<PathBuf> {
+        let name = percent_decode_str(uri.split('?').next()?).decode_utf8().ok()?;
+        if uri.contains("://") {
+            return None;
+        }
+        let mut finder = Finder { resolver: self.resolver, missed: *self.missed };
+        let found = finder.find(&name, &[Path::new("")]);
+        *self.missed = finder.missed;
+        found.ok().map(|place| place.path)
     }
 
     /// Whether so many bytes may still be taken; else the image is left out with a warning.

@@ -239,7 +239,9 @@ fn lights(root: &Root, report: &mut Report) {
     for (i, light) in lights.into_iter().flat_map(|l| &l.lights).enumerate() {
         let place = format!("extensions.KHR_lights_punctual.lights[{i}]");
         match (&light.type_, &light.spot) {
-            (Checked::Valid(Spot), None) => report.add(Code::UndefinedProperty, place, "'spot' is missing"),
+            (Checked::Valid(Spot), None) => {
+                report.warn_with(Code::UndefinedProperty, place, "'spot' is missing", "its angles are the defaults");
+            }
             (Checked::Valid(Spot), Some(spot)) if spot.outer_cone_angle <= spot.inner_cone_angle => {
                 let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
                 report.add(

@@ -63,7 +63,9 @@ pub(super) struct Read {
 /// Reads one primitive; `None` when there is nothing to draw in it.
 pub(super) fn read(reader: Reader, job: &Job, report: &mut Report) -> Option<Read> {
     let Checked::Valid(mode) = job.primitive.mode else { return None };
-    let mut task = Task { reader, job, report, used: None };
+    let positions = job.primitive.attributes.get(&Checked::Valid(Semantic::Positions))?;
+    let vertices = reader.count(*positions);
+    let mut task = Task { reader, job, report, vertices, used: None };
     task.run(mode)
 }
 
@@ -102,6 +104,8 @@ struct Task<'a, 'b> {
     reader: Reader<'a>,
     job: &'b Job<'b>,
     report: &'b mut Report,
+    /// How many there are.
+    vertices: u64,
     /// The vertices that the indices name, when these are not all.
     used: Option<Vec<u32>>,
 }
@@ -111,7 +115,7 @@ impl Task<'_, '_> {
         let positions = self.attribute(Semantic::Positions)?;
         let mut mesh = Mesh { name: self.job.name.into(), ..Mesh::default() };
         let corners = match self.job.primitive.indices {
-            Some(index) => Some(self.corners(index, self.reader.count(positions))?),
+            Some(index) => Some(self.corners(index)?),
             None => None,
         };
         mesh.positions = self.floats::<3>(positions, "attributes.POSITION")?.into_iter().map(Vec3::from).collect();
@@ -139,11 +143,11 @@ impl Task<'_, '_> {
         Some(Read { mesh, center, dropped, lines })
     }
 
-    /// The accessor of an attribute, when its format can be read.
+    /// The accessor of an attribute, when its format can be read and it has a value for each vertex.
     fn attribute(&self, semantic: Semantic) -> Option<Index<Accessor>> {
         let index = self.job.primitive.attributes.get(&Checked::Valid(semantic.clone())).copied()?;
         let format = self.reader.root.accessors.get(index.value()).and_then(Format::of)?;
-        is_readable(&semantic, format).then_some(index)
+        (is_readable(&semantic, format) && self.reader.count(index) == self.vertices).then_some(index)
     }
 
     fn place(&self, part: &str) -> String {
@@ -174,7 +178,7 @@ impl Task<'_, '_> {
     }
 
     /// The vertex of every corner, numbered among those in use.
-    fn corners(&mut self, index: Index<Accessor>, vertices: u64) -> Option<Vec<u32>> {
+    fn corners(&mut self, index: Index<Accessor>) -> Option<Vec<u32>> {
         let format = self.reader.root.accessors.get(index.value()).and_then(Format::of)?;
         if format.shape != Type::Scalar || !is_unsigned(format.component) {
             return None;
@@ -186,7 +190,14 @@ impl Task<'_, '_> {
             ComponentType::U16 => 0xffff,
             _ => u32::MAX,
         };
-        let Some(at) = corners.iter().position(|&c| u64::from(c) >= vertices || c == restart) else {
+        let vertices = self.vertices;
+        let place = self.place("indices");
+        let Some(at) = corners.iter().position(|&c| u64::from(c) >= vertices) else {
+            let is_decoded = self.reader.decoded.indices(index.value()).is_some();
+            if u64::from(restart) < vertices && !is_decoded && corners.contains(&restart) {
+                let text = format!("index {restart} asks for a restart elsewhere; here it is a vertex");
+                self.report.warn(Code::AccessorIndexPrimitiveRestart, place, text);
+            }
             self.used = faces::gather(&mut corners, vertices);
             return Some(corners);
         };
@@ -197,12 +208,11 @@ impl Task<'_, '_> {
             let text = format!("index {} at position {at}, but only {vertices} vertices exist", corners[at]);
             (Code::AccessorIndexOob, text)
         };
-        let place = self.place("indices");
         self.report.add(code, place, text);
         None
     }
 
-    /// Reads what goes with the positions; arrays of another length were refused before.
+    /// Reads what goes with the positions.
     fn attributes(&mut self, mesh: &mut Mesh) {
         let count = mesh.positions.len();
         if mesh.positions.iter().any(|p| !p.is_finite()) {

@@ -37,6 +37,7 @@ mod graph;
 mod images;
 mod links;
 mod material;
+mod mend;
 mod mesh;
 mod meshopt;
 mod meshopt_codec;
@@ -110,13 +111,15 @@ impl Loading<'_> {
         self.report.check()?;
         self.take(budget, weight.bytes(), "the JSON, once it is parsed,")?;
         let value = document::parse(container.json, self.report);
-        let value = self.passed(value)?;
+        let mut value = self.passed(value)?;
+        mend::take_out_blanks(&mut value, self.report);
+        mend::lengthen_buffer(&mut value, container.bin, self.report);
         let right_version = version::check(&value, self.report).then_some(());
         self.passed(right_version)?;
         let extensions = extensions::Lists::of(&value);
         extensions.check(file, self.report);
         self.report.check()?;
-        schema::check(&value, self.report);
+        mend::check(&mut value, self.report);
         self.report.check()?;
         let bytes = weight::typed(&value);
         self.take(budget, bytes, "the document")?;
@@ -285,7 +288,7 @@ impl Loading<'_> {
     fn check_budget(&self, reader: Reader, mut budget: Budget) -> Result<(), LoadError> {
         // Zeros need no bytes in the file, so that only the budget bounds them.
         let accessors = reader.root.accessors.iter().enumerate().filter(|(_, a)| a.buffer_view.is_none());
-        let zeros = accessors.filter(|(i, _)| reader.decoded.of(*i).is_none()).map(|(_, a)| a.count.0);
+        let zeros = accessors.filter(|(i, _)| reader.decoded.count(*i).is_none()).map(|(_, a)| a.count.0);
         let largest = zeros.max().unwrap_or(0);
         self.take(&mut budget, largest.saturating_mul(64), "an accessor")
     }

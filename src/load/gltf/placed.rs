@@ -54,8 +54,8 @@ pub(super) fn light(root: &Root, node: &Node, world: DAffine3, report: &mut Repo
     let kind = match (&source.type_, &source.spot) {
         (Checked::Valid(punctual::Type::Directional), _) => LightKind::Directional { direction },
         (Checked::Valid(punctual::Type::Point), _) => LightKind::Point { position, falloff },
-        (Checked::Valid(punctual::Type::Spot), Some(spot)) => {
-            let (inner, outer) = cone(spot);
+        (Checked::Valid(punctual::Type::Spot), spot) => {
+            let (inner, outer) = spot.as_ref().map_or((0.0, WIDE), cone);
             LightKind::Spot { position, direction, inner, outer, falloff }
         }
         // The schema check has told of it.
@@ -64,13 +64,16 @@ pub(super) fn light(root: &Root, node: &Node, world: DAffine3, report: &mut Repo
     Some(Light { name: name(&source.name, node), intensity: color * intensity, kind, shadows: true, size: 0.0 })
 }
 
+/// The outer angle of a cone that none is given for.
+const WIDE: f64 = std::f64::consts::FRAC_PI_4;
+
 /// The angles of a cone, 0 ≤ inner ≤ outer ≤ π/2.
 fn cone(spot: &punctual::Spot) -> (f64, f64) {
     let angle = |value: f32, otherwise: f64| {
         let value = f64::from(value);
         if value.is_nan() { otherwise } else { value.clamp(0.0, std::f64::consts::FRAC_PI_2) }
     };
-    let outer = angle(spot.outer_cone_angle, std::f64::consts::FRAC_PI_4);
+    let outer = angle(spot.outer_cone_angle, WIDE);
     (angle(spot.inner_cone_angle, 0.0).min(outer), outer)
 }
 

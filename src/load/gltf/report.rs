@@ -1,6 +1,6 @@
 //! Gathers what is wrong with a file, sorted by the table of [`super::codes`].
 
-use super::codes::{Code, Verdict};
+use super::codes::{self, Code, Verdict};
 use crate::load::{Diagnostic, LoadError, Warnings};
 use std::path::{Path, PathBuf};
 
@@ -13,11 +13,34 @@ pub(super) struct Report {
     file: PathBuf,
     faults: Warnings,
     pub(super) warnings: Warnings,
+    /// Whether parts that can be left out are, where they would refuse the file; and the places of those that are.
+    leaves_out: bool,
+    broken: Vec<String>,
 }
 
 impl Report {
     pub(super) fn new(file: &Path) -> Self {
-        Self { file: file.into(), faults: Warnings::default(), warnings: Warnings::default() }
+        let (faults, warnings) = (Warnings::default(), Warnings::default());
+        Self { file: file.into(), faults, warnings, leaves_out: false, broken: Vec::new() }
+    }
+
+    pub(super) fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// Whether from now on faults in parts that can be left out are warnings, and their places are kept.
+    pub(super) fn leaves_out(&mut self, leaves_out: bool) {
+        self.leaves_out = leaves_out;
+    }
+
+    /// The places that were kept, in the order of their faults.
+    pub(super) fn take_broken(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.broken)
+    }
+
+    /// Keeps more of them.
+    pub(super) fn break_more(&mut self, places: Vec<String>) {
+        self.broken.extend(places);
     }
 
     /// Files a fault under its code's verdict at `place`.
@@ -31,6 +54,10 @@ impl Report {
 
     /// Files a fault that refuses the file whatever the table says of the milder cases of its code.
     pub(super) fn refuse(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>) {
+        if self.leaves_out && codes::can_be_left_out(place.as_ref()) {
+            self.broken.push(place.as_ref().to_owned());
+            return self.warn_with(code, place, text, "it is left out");
+        }
         let fault = Diagnostic::new(code.name(), &self.file, place.as_ref(), text);
         let kind = kind(&fault);
         self.faults.push_kind(fault, kind);

@@ -5,7 +5,7 @@
 //! read through the [`Resolver`], so nothing outside the root is.
 
 use crate::load::paths::{FileFault, Found, Resolver, shown};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Reads files by careless names.
 pub(in crate::load) struct Finder<'a> {
@@ -36,8 +36,9 @@ impl Finder<'_> {
         Ok(Found { bytes: self.resolver.read_file(&path)?, path, guessed })
     }
 
-    /// Finds `name`, looking in `folders` (relative to the model's), first as written, then in any case, then by the last
-    /// part of its name alone, as written and in any case. The fault is that of the name as written.
+    /// Finds `name`, looking in `folders` (relative to the model's), first as written, then in any case, then without its
+    /// first folders, as written and in any case, then in folders that pictures are in, at last as a picture of another kind.
+    /// The fault is that of the name as written.
     pub(in crate::load) fn find(&mut self, name: &str, folders: &[&Path]) -> Result<Place, FileFault> {
         let slashed = name.replace('\\', "/");
         let mut fault = None;
@@ -68,12 +69,19 @@ impl Finder<'_> {
 
     fn guess(&mut self, name: &str, folders: &[&Path]) -> Option<Place> {
         let last = Path::new(name).file_name()?;
+        let shortened = without_first_folders(name);
         let resolver = &mut *self.resolver;
-        let in_any_case = folders.iter().find_map(|folder| resolver.in_any_case(&folder.join(name)));
-        let path = in_any_case
-            .or_else(|| folders.iter().map(|folder| folder.join(last)).find(|path| resolver.locate(path).is_ok()))
-            .or_else(|| folders.iter().find_map(|folder| resolver.in_any_case(&folder.join(last))))?;
-        let canonical = resolver.locate(&path).ok()?;
+        let as_written =
+            |name: &PathBuf| folders.iter().map(|folder| folder.join(name)).find(|path| resolver.locate(path).is_ok());
+        let found = shortened.iter().find_map(as_written);
+        let path = found.or_else(|| {
+            let names =
+                std::iter::once(PathBuf::from(name)).chain(shortened).chain(moved_or_converted(Path::new(last)));
+            names
+                .into_iter()
+                .find_map(|name| folders.iter().find_map(|folder| resolver.in_any_case(&folder.join(&name))))
+        })?;
+        let canonical = self.resolver.locate(&path).ok()?;
         Some(Place { path, canonical, guessed: true })
     }
 
@@ -117,6 +125,40 @@ impl Finder<'_> {
         let path = PathBuf::from(name.replace('\\', "/"));
         Ok(Found { bytes: self.resolver.read_file(&path)?, path, guessed: false })
     }
+}
+
+/// Folders that pictures are put in when a model is shipped.
+const FOLDERS: [&str; 5] = ["textures", "texture", "maps", "images", "tex"];
+
+/// Kinds of pictures that can be read, and those that are shipped as one of them instead.
+const KINDS: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
+const CONVERTED: [&str; 9] = ["tif", "tiff", "tga", "bmp", "gif", "psd", "dds", "exr", "hdr"];
+
+/// Where the picture of a name may lie, and what it may have become.
+fn moved_or_converted(name: &Path) -> Vec<PathBuf> {
+    let extension = name.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    if !KINDS.iter().chain(&CONVERTED).any(|kind| extension.eq_ignore_ascii_case(kind)) {
+        return Vec::new();
+    }
+    let names = std::iter::once(name.to_path_buf()).chain(KINDS.iter().map(|kind| name.with_extension(kind)));
+    let in_folders = |name: PathBuf| [""].iter().chain(&FOLDERS).map(move |folder| Path::new(folder).join(&name));
+    names.flat_map(in_folders).collect()
+}
+
+/// The last parts of a path, the longest first, at most four of them: of `C:/Users/me/house/maps/a.png` these are
+/// `me/house/maps/a.png`, `house/maps/a.png`, `maps/a.png` and `a.png`.
+fn without_first_folders(name: &str) -> Vec<PathBuf> {
+    /// Each takes a look into folders.
+    const MOST: usize = 4;
+    let parts: Vec<Component> = Path::new(name).components().collect();
+    let shorter = (1..parts.len()).map(|first| &parts[first..]).filter(|parts| parts.len() <= MOST);
+    let is_plain = |parts: &&[Component]| parts.iter().all(|part| matches!(part, Component::Normal(_)));
+    let mut all: Vec<PathBuf> = shorter.filter(is_plain).map(PathBuf::from_iter).collect();
+    // Of a name without folders it is the name.
+    if let [Component::Normal(last)] = parts[..] {
+        all.push(last.into());
+    }
+    all
 }
 
 /// Words of one `mtllib` statement that are tried as one name; bounds the time.
@@ -218,5 +260,30 @@ mod tests {
         assert_eq!(read("MAPS\\wood.png"), Ok(("maps/Wood.PNG".into(), true)));
         assert_eq!(read("tex\\none.png"), Err("'tex\\none.png' is not there".into()));
         assert!(read("/etc/hostname").unwrap_err().contains("outside"));
+    }
+
+    #[test]
+    fn pictures_are_found_in_the_folders_that_they_were_shipped_in() {
+        let read = |name: &str| {
+            with_files(&["textures/wood.png", "house/maps/door.jpg"], |finder| {
+                let found = finder.read(name, &[Path::new("")]);
+                found.map(|f| (f.path.to_string_lossy().into_owned(), f.guessed)).map_err(|e| e.to_string())
+            })
+        };
+        for name in [
+            "C:\\Users\\me\\Desktop\\house\\textures\\wood.png",
+            "..\\textures\\wood.png",
+            "/Users/me/textures/wood.png",
+            "\\textures\\wood.png",
+            "/textures/wood.png",
+            "wood.png",
+            "wood.tif",
+            "/else/where/Wood.TGA",
+        ] {
+            assert_eq!(read(name), Ok(("textures/wood.png".into(), true)), "{name}");
+        }
+        assert_eq!(read("D:/work/house/maps/door.jpg"), Ok(("house/maps/door.jpg".into(), true)));
+        assert_eq!(read("wood.mtl"), Err("'wood.mtl' is not there".into()));
+        assert_eq!(read("other.png"), Err("'other.png' is not there".into()));
     }
 }

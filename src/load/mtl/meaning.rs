@@ -2,14 +2,16 @@
 //!
 //! MTL has many careless writers. Under [`MtlMode::Guess`] the values that no one can have meant are replaced, each with
 //! a counted warning; under [`MtlMode::Literal`] the text counts. Both agree on this: colours are linear (the founding
-//! texts know nothing else, and Blender writes them so) and pictures sRGB-coded; surfaces are seen from both sides;
-//! `illum` 3 and above mirror by `Ks`, of these 4, 6, 7 and 9 are transparent, 5 and 7 have Fresnel's balance; a
-//! material with fields of physically based rendering (`Pr`, `Pm`, …) is one, and its `Ks` is not used.
+//! texts know nothing else, and Blender writes them so; [`super::writer`] tells when they are guessed not to be) and pictures
+//! sRGB-coded; surfaces are seen from both sides; `illum` 3 and above mirror by `Ks`, of these 4, 6, 7 and 9 are transparent,
+//! 5 and 7 have Fresnel's balance; a material with fields of physically based rendering (`Pr`, `Pm`, …) is one, and its `Ks`
+//! is not used.
 //!
 //! The numbers come first ([`Meaning`]), then the pictures ([`super::textures`]): what a factor means may depend on
 //! whether its map could be read.
 
 use super::parse::{Mtl, Slot};
+use super::writer::{Writer, light};
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, MtlMode, Warnings};
 use crate::math::Vec3;
@@ -29,6 +31,8 @@ const NO_IOR: f64 = 1.5;
 pub(super) struct Meaning<'a> {
     pub mtl: &'a Mtl,
     pub mode: MtlMode,
+    /// Who wrote it.
+    pub writer: Writer,
     /// Where warnings say it was.
     pub file: &'a Path,
     pub warnings: &'a mut Warnings,
@@ -44,9 +48,11 @@ impl Meaning<'_> {
         let illum = self.illum();
         let opacity = self.opacity();
         let glass = self.glass(illum, opacity);
+        // Opaque, `illum` of glass says nothing: some programs write it of everything.
+        let illum = if is_of_glass(illum) && !glass { 2 } else { illum };
         let passed = self.passed(glass, opacity);
         let kd = self.diffuse();
-        let physical = self.mtl.is_physical();
+        let physical = self.mtl.is_physical() || self.is_metal_of_blender();
         let reflection = if physical {
             Reflection::MetalRough(self.metal_rough(glass, passed))
         } else if illum == 0 {
@@ -96,22 +102,45 @@ impl Meaning<'_> {
                 self.warn("mtl-constant", "illum 0 (constant colour) is shaded like illum 1");
                 1
             }
+            Some(3) if self.guessing() && self.writer == Writer::Vtk => {
+                self.warn(
+                    "mtl-illum-of-writer",
+                    "the program that wrote this writes illum 3 of everything: it is no mirror",
+                );
+                2
+            }
             Some(illum) => illum,
             None => 2,
         }
     }
 
     fn diffuse(&mut self) -> Vec3 {
-        let missing_map = self.mtl.map(Slot::Diffuse).is_some() && !(self.has_map)(Slot::Diffuse);
+        let is_mapped = (self.has_map)(Slot::Diffuse);
+        let missing_map = self.mtl.map(Slot::Diffuse).is_some() && !is_mapped;
         let black = self.mtl.kd.is_some_and(|kd| kd == [0.0; 3]);
         if missing_map && black && self.guessing() {
             self.warn("mtl-black-under-map", "a colour of 0 under a map that cannot be read counts as grey");
             return Vec3::splat(NO_DIFFUSE);
         }
-        if self.mtl.kd.is_none() && !(self.has_map)(Slot::Diffuse) && self.guessing() {
+        if self.mtl.kd.is_none() && !is_mapped && self.guessing() {
             self.warn("mtl-no-diffuse", "a material without Kd is grey");
         }
-        let default = if (self.has_map)(Slot::Diffuse) { Vec3::ONE } else { Vec3::splat(NO_DIFFUSE) };
+        if black && self.mtl.ni == Some(0.0) && self.mtl.ks.is_none() && !is_mapped && self.guessing() {
+            self.warn(
+                "mtl-no-diffuse",
+                "Kd 0 with Ni 0 and no Ks is what is written of materials that are not known: it is grey",
+            );
+            return Vec3::splat(NO_DIFFUSE);
+        }
+        let is_replaced = is_mapped && self.writer.replaces_by_maps() && self.mtl.kd.is_some_and(|kd| kd != [1.0; 3]);
+        if is_replaced && !black && self.guessing() {
+            self.warn(
+                "mtl-color-under-map",
+                "in the program that wrote this a map takes the place of Kd, which counts as 1",
+            );
+            return Vec3::ONE;
+        }
+        let default = if is_mapped { Vec3::ONE } else { Vec3::splat(NO_DIFFUSE) };
         self.under_map(Slot::Diffuse, self.mtl.kd, default, "Kd")
     }
 
@@ -122,6 +151,11 @@ impl Meaning<'_> {
             Some([0.0, 0.0, 0.0]) if mapped && self.guessing() => {
                 self.warn("mtl-black-under-map", &format!("{name} 0 under a map counts as 1"));
                 Vec3::ONE
+            }
+            Some(factor) if self.guessing() && slot == Slot::Diffuse && are_bytes(factor) => {
+                let text = format!("{name} is {}: it counts as 0…255, as screens show it", words_of(factor));
+                self.warn("mtl-color-bytes", &text);
+                color(light(factor.map(|x| x / 255.0)))
             }
             Some(factor) => {
                 self.tell_unreal(slot, factor, name);
@@ -143,7 +177,7 @@ impl Meaning<'_> {
             }
             _ => return,
         };
-        let text = format!("{name} is {}: {what}", factor.map(|x| x.to_string()).join(" "));
+        let text = format!("{name} is {}: {what}", words_of(factor));
         self.warnings.push(Diagnostic::new("mtl-range", self.file, self.mtl.line.to_string(), text));
     }
 
@@ -154,6 +188,12 @@ impl Meaning<'_> {
             (Some(d), Some(tr)) if (d + tr - 1.0).abs() > 0.01 => {
                 self.warn("mtl-tr-contradicts-d", "Tr is not 1 - d; d counts");
                 d
+            }
+            (None, Some(tr)) if self.writer == Writer::Vtk && self.guessing() => {
+                if tr < 1.0 {
+                    self.warn("mtl-tr-as-opacity", "the program that wrote this writes opacity as Tr");
+                }
+                tr
             }
             (None, Some(tr)) if tr >= 1.0 && self.guessing() => {
                 self.warn(
@@ -166,19 +206,29 @@ impl Meaning<'_> {
             (None, Some(tr)) => 1.0 - tr,
             (None, None) => 1.0,
         };
-        let mapped = (self.has_map)(Slot::Dissolve) || (self.has_map)(Slot::Transparency);
+        let mapped = [Slot::Dissolve, Slot::Transparency, Slot::Diffuse].into_iter().any(self.has_map);
         if opacity <= 0.0 && self.guessing() && (self.all_invisible || mapped) {
             self.warn("mtl-invisible", "d 0 would hide everything, or a map; it counts as 1");
             return 1.0;
+        }
+        if opacity == 0.0 {
+            let text = "its opacity is 0: faces of it are not seen";
+            self.warnings.push(Diagnostic::new("mtl-unseen", self.file, self.mtl.line.to_string(), text));
         }
         self.part("opacity (d, or 1 - Tr)", opacity)
     }
 
     /// Whether light is refracted.
     fn glass(&mut self, illum: i32, opacity: f32) -> bool {
-        let asked = matches!(illum, 4 | 6 | 7 | 9);
+        let asked = is_of_glass(illum);
         // White lets everything pass and black nothing, and opaque materials are written with either.
-        let filters = self.mtl.tf.is_some_and(|tf| tf != [1.0; 3] && tf != [0.0; 3]);
+        let mut filters = self.mtl.tf.is_some_and(|tf| tf != [1.0; 3] && tf != [0.0; 3]);
+        // 3ds Max has one number for both.
+        let is_opacity = |tf: [f64; 3]| tf.iter().all(|part| (part - f64::from(opacity)).abs() < 0.01);
+        if self.guessing() && !asked && filters && opacity < 1.0 && self.mtl.tf.is_some_and(is_opacity) {
+            self.warn("mtl-filter-is-opacity", "Tf is d once more and filters nothing");
+            filters = false;
+        }
         // A filter says nothing of what says in words that it lets nothing pass.
         let says_opaque = opacity >= 1.0 && (self.mtl.d.is_some() || self.mtl.tr.is_some());
         let filters = filters && (asked || !says_opaque);
@@ -186,7 +236,8 @@ impl Meaning<'_> {
         if self.guessing() {
             let refracts = matches!(illum, 6 | 7) && self.mtl.tf.is_some_and(|tf| tf != [0.0; 3]);
             if asked && !passes && !refracts {
-                self.warn("mtl-opaque-glass", "illum asks for glass, but d is 1 and Tf filters nothing: it is opaque");
+                let text = "illum asks for glass, but d is 1 and Tf filters nothing: it is opaque, like illum 2";
+                self.warn("mtl-opaque-glass", text);
             }
             filters || (asked && (passes || refracts))
         } else {
@@ -254,8 +305,10 @@ impl Meaning<'_> {
         if illum <= 1 || ks == Vec3::ZERO {
             return (Vec3::ZERO, 1.0);
         }
+        // Below 1 a highlight would be wider than what lies in the light.
+        let narrowest_told = if self.guessing() { 1.0 } else { f64::MIN_POSITIVE };
         match self.mtl.ns {
-            Some(ns) if ns > 0.0 => (ks, number(ns)),
+            Some(ns) if ns >= narrowest_told => (ks, number(ns)),
             Some(ns) if self.guessing() => {
                 let ns = shorten(&ns.to_string());
                 let text = format!("Ns {ns} would spread the highlight over everything; there is none");
@@ -278,12 +331,19 @@ impl Meaning<'_> {
             Some(0.0) if self.guessing() && ((self.has_map)(Slot::Roughness) || packed) => 1.0,
             Some(pr) => pr,
             None if (self.has_map)(Slot::Roughness) || packed => 1.0,
+            None if self.is_metal_of_blender() => {
+                1.0 - self.mtl.ns.map_or(0.25, |ns| (ns / 1000.0).clamp(0.0, 1.0)).sqrt()
+            }
             None => self.mtl.ns.map_or(0.5, |ns| libm::pow(2.0 / (ns.max(0.0) + 2.0), 0.25)),
         };
         let metallic = match self.mtl.pm {
             Some(0.0) if self.guessing() && ((self.has_map)(Slot::Metallic) || packed) => 1.0,
             Some(pm) => pm,
             None if (self.has_map)(Slot::Metallic) || packed => 1.0,
+            None if self.is_metal_of_blender() => {
+                self.warn("mtl-illum-of-writer", "illum 3 of Blender is metal: Ka says how much of one, Ns how smooth");
+                self.mtl.ka.map_or(1.0, |[metallic, ..]| metallic)
+            }
             None => 0.0,
         };
         let ior = self.ior(glass);
@@ -299,6 +359,11 @@ impl Meaning<'_> {
             grain: self.grain().map(Box::new),
             ..MetalRough::default()
         }
+    }
+
+    /// Whether it is a metal as Blender wrote them before it had fields for them.
+    fn is_metal_of_blender(&self) -> bool {
+        self.guessing() && self.writer == Writer::Blender && self.mtl.illum == Some(3) && !self.mtl.is_physical()
     }
 
     /// `Ps`: white fibres. No field tells their roughness.
@@ -337,6 +402,22 @@ impl Meaning<'_> {
     }
 }
 
+/// Whether `illum` asks for light to be refracted.
+fn is_of_glass(illum: i32) -> bool {
+    matches!(illum, 4 | 6 | 7 | 9)
+}
+
+/// Whether a colour, of what sends back no more light than falls on it, is one of 0…255.
+fn are_bytes(color: [f64; 3]) -> bool {
+    /// More than any slip.
+    const LEAST: f64 = 2.0;
+    color.iter().any(|&x| x > LEAST) && color.iter().all(|x| (0.0..=255.0).contains(x))
+}
+
+fn words_of(color: [f64; 3]) -> String {
+    color.map(|x| x.to_string()).join(" ")
+}
+
 /// A share of at most 1; `None` where nothing of it is there.
 fn share(of: Option<f64>) -> Option<f32> {
     of.map(|x| number(x.clamp(0.0, 1.0))).filter(|x| *x > 0.0)
@@ -365,6 +446,10 @@ mod tests {
     }
 
     fn read(text: &str, mode: MtlMode, maps: &[Slot]) -> (Material, Vec<Diagnostic>) {
+        read_of("", text, mode, maps)
+    }
+
+    fn read_of(comment: &str, text: &str, mode: MtlMode, maps: &[Slot]) -> (Material, Vec<Diagnostic>) {
         let mut warnings = Warnings::default();
         let (text, file) = (format!("newmtl m\n{text}"), Path::new("m.mtl"));
         let mut budget = Budget::new(&Limits::default());
@@ -373,6 +458,7 @@ mod tests {
         let mut meaning = Meaning {
             mtl: &mtl,
             mode,
+            writer: Writer::of(comment.as_bytes()),
             file: Path::new("m.mtl"),
             warnings: &mut warnings,
             has_map: &has_map,
@@ -380,6 +466,12 @@ mod tests {
         };
         let material = meaning.material();
         (material, warnings.into_vec())
+    }
+
+    /// A material in a file that begins with a comment.
+    fn guess_of(comment: &str, text: &str, maps: &[Slot]) -> (Material, Vec<&'static str>) {
+        let (material, warnings) = read_of(comment, text, MtlMode::Guess, maps);
+        (material, warnings.iter().map(|w| w.code).collect())
     }
 
     fn guess(text: &str) -> (Material, Vec<&'static str>) {
@@ -476,12 +568,17 @@ mod tests {
     fn parts_outside_of_0_to_1_are_told_and_the_nearest_counts() {
         let (m, warnings) = guess("Kd 1\nd -1");
         assert_eq!((m.opacity, warnings), (0.0, vec!["mtl-range"]));
+        assert_eq!(guess("Kd 1\nd 0").1, ["mtl-unseen"]);
         let (m, warnings) = guess("Kd 1\nPm 5\nPr 0.5");
         assert_eq!((m.metal_rough().unwrap().metallic, warnings), (1.0, vec!["mtl-range"]));
         assert!(guess("Kd 1\nPm 1\nPr 0\nd 1").1.is_empty());
         // Colours stay as they are: light may be brighter than white.
-        let (m, warnings) = guess("Kd 255 128 0\nKe 4 4 4");
-        assert_eq!((m.base_color, warnings), (Vec3::new(255.0, 128.0, 0.0), vec!["mtl-range"]));
+        let (m, warnings) = guess("Kd 1.5 1 0\nKe 4 4 4");
+        assert_eq!((m.base_color, warnings), (Vec3::new(1.5, 1.0, 0.0), vec!["mtl-range"]));
+        assert_eq!(literal("Kd 255 128 0").base_color, Vec3::new(255.0, 128.0, 0.0));
+        let (m, warnings) = guess("Kd 255 128 0");
+        assert_eq!(warnings, ["mtl-color-bytes"]);
+        assert!((m.base_color - Vec3::new(1.0, 0.2158605, 0.0)).abs().max_element() < 1e-5, "{}", m.base_color);
         let (m, warnings) = guess("Kd 1 -1 0.5\nKe 0 -2 0");
         assert_eq!((m.base_color, m.emission), (Vec3::new(1.0, 0.0, 0.5), Vec3::ZERO));
         assert_eq!(warnings, ["mtl-range"; 2]);
@@ -500,11 +597,68 @@ mod tests {
     }
 
     #[test]
+    fn what_programs_write_of_everything_makes_no_mirrors_and_no_glass() {
+        // Maya, Cinema 4D, VTK.
+        for (comment, text, told) in [
+            ("", "illum 4\nKd .5 .5 .5\nKa 0 0 0\nTf 1 1 1\nNi 1\nKs .5 .5 .5\nNs 18", "mtl-opaque-glass"),
+            ("", "illum 7\nKd .8 .8 .8\nKa 0 0 0\nKs 1 1 1\nNs 43", "mtl-opaque-glass"),
+            ("# by the Visualization Toolkit", "Kd 1 0 0\nKs 1 1 1\nNs 9\nillum 3", "mtl-illum-of-writer"),
+        ] {
+            let (m, warnings) = guess_of(comment, text, &[]);
+            assert!(warnings.contains(&told), "{text}: {warnings:?}");
+            let p = phong(&m);
+            assert_eq!((p.mirror, p.transmission), (Vec3::ZERO, Vec3::ZERO), "{text}");
+            assert!(p.specular != Vec3::ZERO, "{text}");
+        }
+        assert_eq!(phong(&literal("Kd 1\nKs 1\nNs 9\nillum 7")).mirror, Vec3::ONE);
+
+        let (m, warnings) = guess_of("# VTK, the Visualization Toolkit", "Kd 1 0 0\nTr 0.2", &[]);
+        assert_eq!((m.opacity, warnings), (0.2, vec!["mtl-tr-as-opacity"]));
+        // 3ds Max writes opacity as Tf, too.
+        let (m, warnings) = guess("Kd .26 .26 .26\nNi 1.5\nd 0.1\nTr 0.9\nTf 0.1 0.1 0.1\nillum 2");
+        assert_eq!((m.opacity, m.alpha_mode, warnings), (0.1, AlphaMode::Blend, vec!["mtl-filter-is-opacity"]));
+        assert_eq!(phong(&m).transmission, Vec3::ZERO);
+    }
+
+    #[test]
+    fn metals_of_blender_are_metals() {
+        let text = "Ns 10\nKa 1 1 1\nKd 0.8 0.6 0.2\nKs 0.5 0.5 0.5\nNi 1.5\nd 1\nillum 3";
+        let (m, warnings) = guess_of("# Blender 3.3.0 MTL File: 'a.blend'", text, &[]);
+        let metal = m.metal_rough().unwrap();
+        assert_eq!((metal.metallic, metal.roughness, warnings), (1.0, 0.9, vec!["mtl-illum-of-writer"]));
+        assert!(matches!(guess_of("# another", text, &[]).0.reflection, Reflection::Phong(_)));
+    }
+
+    #[test]
+    fn maps_take_the_place_of_colors_where_they_did_in_the_program_that_wrote_them() {
+        let of = |comment: &str, text: &str| guess_of(comment, text, &[Slot::Diffuse]);
+        for comment in ["# 3ds Max Wavefront OBJ Exporter", "# Blender MTL File: 'a'", "# Created with AliceVision"] {
+            let (m, warnings) = of(comment, "Kd 0.588 0.588 0.588\nmap_Kd a.png");
+            assert_eq!((m.base_color, warnings), (Vec3::ONE, vec!["mtl-color-under-map"]), "{comment}");
+            assert_eq!(of(comment, "Kd 1 1 1\nmap_Kd a.png").1.len(), 0);
+        }
+        assert_eq!(of("", "Kd 0.5 0.5 0.5\nmap_Kd a.png").0.base_color, Vec3::splat(0.5));
+    }
+
+    #[test]
+    fn materials_of_which_nothing_is_known_are_grey() {
+        let unknown = "illum 4\nKd 0.00 0.00 0.00\nKa 0.00 0.00 0.00\nTf 1.00 1.00 1.00\nNi 0.00";
+        let (m, warnings) = guess(unknown);
+        assert_eq!(m.base_color, Vec3::splat(NO_DIFFUSE));
+        assert!(warnings.contains(&"mtl-no-diffuse"), "{warnings:?}");
+        assert_eq!(literal(unknown).base_color, Vec3::ZERO);
+        // Black that somebody chose.
+        assert_eq!(guess("Kd 0 0 0\nNi 1").0.base_color, Vec3::ZERO);
+        assert_eq!(of("Kd 0.5 0.5 0.5\nd 0\nmap_Kd a.png", MtlMode::Guess, &[Slot::Diffuse]).0.opacity, 1.0);
+    }
+
+    #[test]
     fn a_highlight_without_width_is_none_and_without_exponent_satin() {
         let (m, warnings) = guess("Kd 1\nKs 1\nNs 0\nillum 2");
         assert_eq!((phong(&m).specular, warnings), (Vec3::ZERO, vec!["mtl-flat-highlight"]));
         let told = read("Kd 1\nKs 1\nNs -3", MtlMode::Guess, &[]).1.remove(0).text;
         assert!(told.starts_with("Ns -3 would spread the highlight"), "{told}");
+        assert_eq!(guess("Kd 1\nKs 1\nNs 0.2\nillum 2").1, ["mtl-flat-highlight"]);
         let (m, warnings) = guess("Kd 1\nKs 1");
         assert_eq!((phong(&m).shininess, warnings), (32.0, vec!["mtl-no-shininess"]));
         assert_eq!(phong(&literal("Kd 1\nKs 1\nNs 0")).shininess, 0.0);

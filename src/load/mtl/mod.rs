@@ -8,11 +8,12 @@ mod options;
 mod parse;
 mod pictures;
 mod textures;
+mod writer;
 
 use crate::load::limits::{Budget, Limits};
 use crate::load::paths::{Found, Resolver, shorten, taken_from};
 use crate::load::text::lines::without_comment;
-use crate::load::{Diagnostic, LoadOptions, MtlMode, Warnings};
+use crate::load::{Diagnostic, LoadOptions, MtlMode, Warnings, detect};
 use crate::math::Vec3;
 use crate::scene::{Bitmap, Material, Texture};
 use crate::stopwatch::Spent;
@@ -22,6 +23,7 @@ use parse::{Mtl, Slot};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use textures::{Library, Mapper, Textures};
+use writer::Writer;
 
 /// What a model's surfaces are made of.
 #[derive(Debug, Default)]
@@ -56,6 +58,7 @@ struct Read {
     file: PathBuf,
     /// Relative to the model's.
     folder: PathBuf,
+    writer: Writer,
     materials: Vec<Mtl>,
 }
 
@@ -142,15 +145,28 @@ fn read_library(found: Found, line: u32, names: &str, reading: &mut Reading) -> 
         reading.warnings.push(Diagnostic::new("mtl-file-elsewhere", reading.file, line.to_string(), text));
     }
     let file = folder_of(reading.file).join(&found.path);
+    if let Some(other) = detect::other_than_text(&found.bytes) {
+        let text = format!("material library '{}' is {other}", found.path.display());
+        reading.warnings.push(Diagnostic::new("mtl-no-library", reading.file, line.to_string(), text));
+    }
     let mut materials = parse::parse(&found.bytes, &file, reading.budget, reading.warnings);
+    let writer = Writer::of(&found.bytes);
     if reading.options.mtl != MtlMode::Literal {
+        if writer != Writer::Blender && writer::are_codes(&materials) {
+            for mtl in &mut materials {
+                (mtl.kd, mtl.ke) = (mtl.kd.map(writer::light), mtl.ke.map(writer::light));
+            }
+            let text = "Kd and Ke are numbers of eight bits, and read as screens show them (sRGB)";
+            let warning = Diagnostic::new("mtl-coded-colors", &file, "", text);
+            reading.warnings.push(warning.remedy("--mtl literal takes them for linear light"));
+        }
         for line in materials.iter_mut().filter_map(Mtl::take_ambient_map) {
             let text = "map_Ka is drawn as map_Kd, which there is none of";
             reading.warnings.push(Diagnostic::new("mtl-ambient-map", &file, line.to_string(), text));
         }
     }
     let folder = found.path.parent().map(Path::to_path_buf).unwrap_or_default();
-    Read { file, folder, materials }
+    Read { file, folder, writer, materials }
 }
 
 /// The library of the model's own name, for models that use materials but name no library that is there.
@@ -251,8 +267,15 @@ fn make(
     let library = Library { number: l, file: &read[l].file, folder: &read[l].folder };
     let (mtl, mode) = (&read[l].materials[m], reading.options.mtl);
     let has_map = |slot: Slot| textures.picture(l, mtl, slot).is_some();
-    let mut meaning =
-        Meaning { mtl, mode, file: library.file, warnings: reading.warnings, has_map: &has_map, all_invisible };
+    let mut meaning = Meaning {
+        mtl,
+        mode,
+        writer: read[l].writer,
+        file: library.file,
+        warnings: reading.warnings,
+        has_map: &has_map,
+        all_invisible,
+    };
     let mut material = meaning.material();
     let (limits, budget) = (&reading.options.limits, &mut *reading.budget);
     Mapper { textures, library: &library, mtl, mode, limits, budget, warnings: reading.warnings }.apply(&mut material);

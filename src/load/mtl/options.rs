@@ -66,18 +66,18 @@ pub(super) fn parse(rest: &[u8], line: u32) -> Option<Map> {
         base_gain: None,
         ignored: Vec::new(),
     };
-    let name = take_options(&mut map, rest);
+    let name = take_options(&mut map, rest, true);
     // Some programs write options after the name.
     let (name, late) = name.split_at(late_options(name));
-    take_options(&mut map, late.trim_ascii());
+    take_options(&mut map, late.trim_ascii(), false);
     let name = name.trim_ascii();
     let unquoted = name.strip_prefix(b"\"").and_then(|n| n.strip_suffix(b"\"")).unwrap_or(name);
     map.file = decode_name(unquoted);
     (!map.file.is_empty()).then_some(map)
 }
 
-/// Takes options from the front; what is left is the file's name, which may hold spaces.
-fn take_options<'a>(map: &mut Map, mut rest: &'a [u8]) -> &'a [u8] {
+/// Takes options from the front; what is left is the file's name, which may hold spaces, if that follows.
+fn take_options<'a>(map: &mut Map, mut rest: &'a [u8], name_follows: bool) -> &'a [u8] {
     while let Some(&(option, most)) = OPTIONS.iter().find(|(o, _)| first_word(rest).eq_ignore_ascii_case(o)) {
         rest = rest[option.len()..].trim_ascii_start();
         let numeric = matches!(option, b"-o" | b"-s" | b"-t" | b"-mm" | b"-bm" | b"-boost" | b"-texres");
@@ -86,7 +86,7 @@ fn take_options<'a>(map: &mut Map, mut rest: &'a [u8]) -> &'a [u8] {
             let word = first_word(rest);
             let is_value = !word.is_empty() && (!numeric || is_number(word));
             // The last word is the file, even if it is called 1.5.
-            if !is_value || (!values.is_empty() && word.len() == rest.len()) {
+            if !is_value || (name_follows && !values.is_empty() && word.len() == rest.len()) {
                 break;
             }
             values.push(word);
@@ -166,6 +166,9 @@ mod tests {
         let map = of("-s 2 3 1 -o 0.5 -clamp on -imfchan g -bm 0.3 a b.png");
         assert_eq!((map.file.as_str(), map.scale, map.offset), ("a b.png", DVec2::new(2.0, 3.0), DVec2::new(0.5, 0.0)));
         assert_eq!((map.clamp, map.channel, map.bump), (true, Some(Channel::Green), Some(0.3)));
+        let late = of("c.png -s 4 5 -o 0.25 0.5");
+        assert_eq!((late.scale, late.offset), (DVec2::new(4.0, 5.0), DVec2::new(0.25, 0.5)));
+        assert_eq!(of("c.png -mm 0.1 0.9").base_gain, Some((0.1, 0.9)));
         let late = of("-imfchan r bump2.jpg -bm 1.5");
         assert_eq!((late.file.as_str(), late.bump, late.channel), ("bump2.jpg", Some(1.5), Some(Channel::Red)));
     }

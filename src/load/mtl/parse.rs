@@ -60,6 +60,7 @@ pub(super) enum Slot {
     OcclusionRoughMetal,
     /// Roughness, metal, occlusion in red, green, blue.
     RoughMetalOcclusion,
+    Occlusion,
     Sheen,
     Coat,
     CoatRoughness,
@@ -68,7 +69,7 @@ pub(super) enum Slot {
 }
 
 /// Map statements, in lower case.
-const MAPS: [(&[u8], Slot); 25] = [
+const MAPS: [(&[u8], Slot); 32] = [
     (b"map_ka", Slot::Ambient),
     (b"map_kd", Slot::Diffuse),
     (b"map_ks", Slot::Specular),
@@ -85,8 +86,15 @@ const MAPS: [(&[u8], Slot); 25] = [
     (b"map_norm", Slot::Normal),
     (b"map_normal", Slot::Normal),
     (b"map_kn", Slot::Normal),
+    (b"normal", Slot::Normal),
+    (b"map_tangentspacenormal", Slot::Normal),
     (b"map_pr", Slot::Roughness),
+    (b"map_roughness", Slot::Roughness),
     (b"map_pm", Slot::Metallic),
+    (b"map_metallic", Slot::Metallic),
+    (b"map_ao", Slot::Occlusion),
+    (b"map_ambientocclusion", Slot::Occlusion),
+    (b"map_occlusion", Slot::Occlusion),
     (b"map_orm", Slot::OcclusionRoughMetal),
     (b"map_rma", Slot::RoughMetalOcclusion),
     (b"map_ps", Slot::Sheen),
@@ -105,7 +113,7 @@ const REFLECTED: (&str, &str) =
     ("a reflection map (refl) is not drawn", "mirrors see the scene; --env puts a picture around it");
 
 /// Statements that change nothing in our pictures.
-const SILENT: [&[u8]; 4] = [b"sharpness", b"map_aat", b"km", b"ke_strength"];
+const SILENT: [&[u8]; 5] = [b"sharpness", b"map_aat", b"km", b"ke_strength", b"interpolatemode"];
 
 impl Mtl {
     /// Whether both say the same, wherever they say it.

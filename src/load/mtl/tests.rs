@@ -252,6 +252,8 @@ fn an_ambient_map_is_the_diffuse_one_where_there_is_no_other() {
     let both = "newmtl a\nKd 1 1 1\nmap_Ka a.png\nmap_Kd b.png\n";
     let (loaded, m) = guess(both, &[("a.png", [1, 2, 3, 255]), ("b.png", [4, 5, 6, 255])]);
     assert_eq!(texel(&loaded, m.base_color_map.as_ref()), [4, 5, 6, 255]);
+    assert_eq!(codes(&loaded), ["mtl-ambient"]);
+    let (loaded, _) = guess(&both.replace("a.png", "b.png"), &[("b.png", [4, 5, 6, 255])]);
     assert!(loaded.warnings.is_empty());
 }
 

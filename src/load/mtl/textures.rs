@@ -59,6 +59,16 @@ fn without_remark(name: &str) -> Option<&str> {
     (!name.is_empty()).then_some(name)
 }
 
+/// The ends of a name that begins with what looks like options of another program, `-colorspace sRGB a.png`: without the first
+/// word, without two, and so on.
+fn without_options(name: &str) -> impl Iterator<Item = &str> {
+    /// Words that are left out at most.
+    const MOST: usize = 4;
+    let begin = |at: usize| name.as_bytes()[at].is_ascii_whitespace();
+    let spaces = (0..name.len()).filter(move |&at| name.starts_with('-') && begin(at));
+    spaces.map(|at| name[at..].trim_start()).filter(|rest| !rest.is_empty()).take(MOST)
+}
+
 /// Maps that are drawn. Ambient light sees the diffuse map unless the text counts.
 fn is_drawn(slot: Slot, mode: MtlMode) -> bool {
     slot != Slot::Ambient || mode == MtlMode::Literal
@@ -126,7 +136,8 @@ impl Textures {
         };
         let folders = [library.folder, Path::new("")];
         let found = finder.find(&map.file, &folders).or_else(|fault| {
-            let other = without_remark(&map.file).and_then(|name| finder.find(unquote(name), &folders).ok());
+            let others = without_remark(&map.file).into_iter().chain(without_options(&map.file));
+            let other = others.into_iter().find_map(|name| finder.find(unquote(name), &folders).ok());
             other.ok_or_else(|| lost(fault))
         })?;
         if self.files.contains_key(&found.canonical) {
@@ -199,6 +210,7 @@ impl Mapper<'_> {
         let packed = self.whole(Slot::OcclusionRoughMetal);
         let rough_metal = packed.or_else(|| self.rough_metal());
         let occlusion = packed.or_else(|| self.occlusion());
+        self.tell_of_ambient_map();
         let ambient = if self.mode == MtlMode::Literal { self.whole(Slot::Ambient) } else { material.base_color_map };
         let base_is_black = material.base_color == crate::math::Vec3::ZERO;
         match &mut material.reflection {
@@ -292,6 +304,11 @@ impl Mapper<'_> {
             let has_alpha = self.textures.pictures.alpha(picture) == Alpha::Used;
             let guess = map.channel.is_none() && has_alpha && self.mode == MtlMode::Guess;
             let channel = if guess { Some(Channel::Alpha) } else { map.channel };
+            let is_once_more = diffuse == Some(picture) && map.channel.is_none() && !has_alpha;
+            if is_once_more && self.mode == MtlMode::Guess && !self.textures.pictures.is_grey(picture) {
+                self.guess("mtl-map-alpha", "map_d is map_Kd once more, which has no alpha channel: it is opaque");
+                return (None, false);
+            }
             if diffuse == Some(picture) && channel == Some(Channel::Alpha) {
                 return (None, true);
             }
@@ -371,11 +388,24 @@ impl Mapper<'_> {
         self.texture(take, &map)
     }
 
-    /// The occlusion in a map that has it in blue.
+    /// A map of occlusion, or that in a map that has it in blue.
     fn occlusion(&mut self) -> Option<TextureRef> {
+        if self.picture(Slot::Occlusion).is_some() {
+            return self.scalar(Slot::Occlusion);
+        }
         let (map, picture) = self.picture(Slot::RoughMetalOcclusion)?;
         let map = map.clone();
         self.texture(Take::Channel(picture, Channel::Blue), &map)
+    }
+
+    /// Tells of an ambient map that is another than the diffuse one.
+    fn tell_of_ambient_map(&mut self) {
+        let file = |slot: Slot| self.mtl.map(slot).map(|map| &map.file);
+        if self.mode == MtlMode::Guess
+            && file(Slot::Ambient).is_some_and(|ambient| file(Slot::Diffuse) != Some(ambient))
+        {
+            self.guess("mtl-ambient", "map_Ka is not used; ambient light sees map_Kd");
+        }
     }
 
     /// Roughness and metal in one texture; both go by the options of the first there is.

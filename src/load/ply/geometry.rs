@@ -38,7 +38,7 @@ pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Res
     let behind = body.behind();
     bare.places = (header.encoding == Encoding::Text).then_some(body.words.places);
     bare.comments.clone_from(&header.comments);
-    bare.told = passed_over(header, &source.path);
+    bare.told.splice(..0, passed_over(header, &source.path));
     bare.told.extend(odd.told(&source.path));
     // Rows may share lines; where they do by mistake, numbers are left in the end.
     bare.told.extend(torn.filter(|_| behind.is_some()));
@@ -159,6 +159,7 @@ impl Reader<'_, '_> {
             .map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
 
         if self.packed_vertices(element, &slots, [has_normals, has_uvs, has_colors]) {
+            self.brighten(element, &slots);
             return Ok(());
         }
         // The budget has room for so many, so memory has.
@@ -188,7 +189,29 @@ impl Reader<'_, '_> {
                 self.bare.colors.push(color.map(|c| c as f32));
             }
         }
+        self.brighten(element, &slots);
         Ok(())
+    }
+
+    /// Takes colours of sixteen bits for bytes where all are below 256: some programs write bytes into wider numbers, and no scan
+    /// is as dark as that.
+    fn brighten(&mut self, element: &Element, slots: &[Option<usize>]) {
+        /// What a byte is less than as it should be.
+        const WIDER: f32 = 257.0;
+        /// Less may be noise in the dark.
+        const LEAST: f32 = 8.0 / 255.0 / WIDER;
+        let of_slot = |slot: usize| element.properties.iter().zip(slots).find(|(_, s)| **s == Some(slot));
+        let is_wide = |slot: usize| of_slot(slot).is_some_and(|(property, _)| property.kind == Kind::U16);
+        let greatest = self.bare.colors.iter().flat_map(|color| &color[..3]).copied().fold(0.0, f32::max);
+        // Half a step, for what rounding may do.
+        let are_bytes = (LEAST..1.0 / WIDER + 0.5 / 65535.0).contains(&greatest);
+        if !are_bytes || !COLOR.into_iter().all(is_wide) {
+            return;
+        }
+        let parts = if is_wide(ALPHA) { 4 } else { 3 };
+        self.bare.colors.iter_mut().flat_map(|color| &mut color[..parts]).for_each(|part| *part *= WIDER);
+        let text = "colours of 16 bits, all of them below 256, are taken as 0 … 255";
+        self.bare.told.push(Diagnostic::new("color-bytes", &self.source.path, "", text));
     }
 
     /// Reads the vertices of a binary file side by side, where they are no lists and go with these numbers of them; whether

@@ -414,6 +414,13 @@ fn float_colours_above_one_are_bytes() {
     let loaded = triangle(colors, "", "", ["255 0 0", "0 255 0", "0 0 0"], "");
     assert_eq!(loaded.scene.meshes[0].colors[..2], [Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::new(0.0, 1.0, 0.0, 1.0)]);
     assert_eq!(loaded.warnings[0].code, "color-bytes");
+    let wide = colors.replace("float", "ushort");
+    let loaded = triangle(&wide, "", "", ["255 0 0", "0 51 0", "0 0 0"], "");
+    let [first, second, _] = loaded.scene.meshes[0].colors[..] else { panic!("three corners") };
+    assert!((first - Vec4::new(1.0, 0.0, 0.0, 1.0)).abs().max_element() < 1e-6, "{first}");
+    assert!(second.y > 0.02 && loaded.warnings[0].code == "color-bytes", "{second}");
+    let loaded = triangle(&wide, "", "", ["65535 0 0", "0 255 0", "0 0 0"], "");
+    assert!(loaded.scene.meshes[0].colors[1].y < 0.001 && loaded.warnings.is_empty());
     let beyond = triangle(colors, "", "", ["1.5 0 0", "0 -1 0", "0 0 nan"], "");
     assert_eq!((beyond.warnings[0].code, beyond.scene.meshes[0].colors[2]), ("color-range", Vec4::ONE));
 }

@@ -25,8 +25,8 @@ pub(in crate::load) fn is_exact(bytes: &[u8]) -> bool {
     claimed(bytes).is_some_and(|count| HEADER as u64 + count * TRIANGLE as u64 == bytes.len() as u64)
 }
 
-/// Reads every triangle. A header that claims none is not believed where whole ones follow: programs write it first, and
-/// some never come back to it.
+/// Reads every triangle. A header that claims none, or as many as can be, is not believed where whole ones follow: programs
+/// write it first, and some never come back to it.
 ///
 /// # Errors
 /// When there are fewer than the header claims. What follows them is not looked at; a warning counts it.
@@ -39,11 +39,12 @@ pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnost
     let claimed = claimed(bytes)
         .ok_or_else(|| fault(bytes.len(), format!("the file ends inside its header of {HEADER} bytes")))?;
     let (records, rest) = bytes[HEADER..].as_chunks::<TRIANGLE>();
-    if (records.len() as u64) < claimed {
+    let is_claim = claimed != 0 && claimed != u64::from(u32::MAX);
+    let uncounted = !is_claim && !records.is_empty() && rest.is_empty();
+    if (records.len() as u64) < claimed && !uncounted {
         let text = format!("the header claims {claimed} triangles, but only {} are there", records.len());
         return Err(fault(HEADER + records.len() * TRIANGLE, text));
     }
-    let uncounted = claimed == 0 && !records.is_empty() && rest.is_empty();
     // As many as there are in memory.
     let records = if uncounted { records } else { &records[..claimed as usize] };
     let paint = Paint::of(&bytes[..80], records);
@@ -57,7 +58,7 @@ pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnost
     let bits = |place: DVec3| place.as_vec3().to_array().map(f32::to_bits);
     let mut bare = making.triangles(3 * records.len(), |corner| place(records, corner), bits, colors)?;
     if uncounted {
-        let text = format!("the header claims 0 triangles, but {} are there", records.len());
+        let text = format!("the header claims {claimed} triangles, but {} are there", records.len());
         let warning = Diagnostic::new("stl-uncounted", &source.path, "byte 80", text);
         bare.told.push(warning.remedy("they are drawn"));
     }

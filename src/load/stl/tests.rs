@@ -84,6 +84,29 @@ fn keywords_come_in_any_case_on_any_lines_in_several_solids() {
 }
 
 #[test]
+fn what_programs_add_and_leave_out_changes_nothing() {
+    let expected = format!("{:?}", plain(text().as_bytes()).scene);
+    for (from, to) in [
+        ("endsolid tetra of ours", "endsolidtetra"),
+        ("endsolid tetra of ours", "end solid tetra of ours"),
+        ("endloop", "end loop"),
+        ("endfacet", "end facet"),
+        (" endfacet\n", ""),
+        ("endfacet", "endfacet 0.5 0.25 1.0"),
+        (" facet", "color 0.5 0.25 1.0\n facet"),
+        ("  outer", "color 0.5 0.25 1.0\n  outer"),
+    ] {
+        let file = text().replace(from, to);
+        let loaded = plain(file.as_bytes());
+        assert_eq!((format!("{:?}", loaded.scene), loaded.warnings.len()), (expected.clone(), 0), "{file}");
+        if !to.starts_with("color") {
+            assert_eq!(plain(file.replace('\n', " ").as_bytes()).facts.faces, 4, "{file}");
+        }
+    }
+    assert!(fault(text().replace("endloop", "endlop").as_bytes()).contains("`endlop` where `endloop` should be"));
+}
+
+#[test]
 fn a_file_on_one_line_is_read_and_one_without_its_end_is_told_of() {
     let whole = plain(text().as_bytes());
     let one = plain(text().replace('\n', " ").as_bytes());
@@ -164,8 +187,8 @@ fn what_is_beyond_the_last_triangle_is_told_and_not_looked_at() {
 #[test]
 fn a_count_takes_no_memory() {
     let mut huge = binary("");
-    huge[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
-    assert!(fault(&huge).contains("claims 4294967295 triangles, but only 4"));
+    huge[80..84].copy_from_slice(&(u32::MAX - 1).to_le_bytes());
+    assert!(fault(&huge).contains("claims 4294967294 triangles, but only 4"));
     let small = LoadOptions { limits: Limits { memory: 500, ..Limits::default() }, ..LoadOptions::default() };
     assert!(of(&binary(""), &small).unwrap_err().ends_with("raise --max-memory"));
 }
@@ -221,6 +244,9 @@ fn triangles_behind_a_header_that_counts_none_are_drawn_and_told() {
     let loaded = plain(&bytes);
     let text = "a.stl:byte 80: the header claims 0 triangles, but 4 are there; they are drawn";
     assert_eq!((loaded.facts.faces, loaded.warnings[0].to_string().as_str()), (4, text));
+    bytes[80..84].fill(0xff);
+    assert_eq!(plain(&bytes).warnings[0].to_string(), text.replace("claims 0", "claims 4294967295"));
+    bytes[80..84].fill(0);
     // What is no whole triangle is none.
     bytes.pop();
     let loaded = plain(&bytes);

@@ -1,7 +1,8 @@
 //! STL as text: `solid`, then for each triangle `facet normal x y z`, `outer loop`, three times `vertex x y z`, `endloop`,
 //! `endfacet`; at the end `endsolid`. There may be several solids.
 //!
-//! Words may stand on any lines and in any case, as programs write them.
+//! Words may stand on any lines and in any case, as programs write them. Some part `endloop` and the like in two, leave out
+//! `endfacet`, or write colours, which no two programs write alike and which are not read.
 
 use super::Making;
 use crate::load::geometry::bare::Bare;
@@ -17,7 +18,7 @@ const FACET: u64 = 3 * 3 * size_of::<DVec3>() as u64;
 /// Reads every triangle.
 ///
 /// # Errors
-/// At the first word that is out of place, with its line. A solid without its end may be whole all the same; a warning says
+/// At the first word that is out of place, with its line; colours never are. A solid without its end may be whole all the same; a warning says
 /// so.
 pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnostic> {
     // Zeros fill the last block of what was copied in blocks.
@@ -36,10 +37,10 @@ pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnost
             making.take(1)?;
             making.hold(1, FACET)?;
             facets.push(facet(&mut words)?);
-        } else if is(word, "endsolid") {
+        } else if ends_solid(word) || (is(word, "end") && words.expect("solid").is_ok()) {
             open = false;
             words.pass_name();
-        } else if word.starts_with(b"#") {
+        } else if word.starts_with(b"#") || is_color(word) {
             words.words.rest_of_line();
         } else {
             return Err(words.fault(word, "`solid`, `facet` or `endsolid`"));
@@ -66,6 +67,7 @@ fn facet(words: &mut Words) -> Result<[DVec3; 3], Diagnostic> {
     for _ in 0..3 {
         words.next();
     }
+    words.pass_color();
     words.expect("outer")?;
     words.expect("loop")?;
     let mut corners = [DVec3::ZERO; 3];
@@ -73,9 +75,19 @@ fn facet(words: &mut Words) -> Result<[DVec3; 3], Diagnostic> {
         words.expect("vertex")?;
         *corner = DVec3::new(words.number()?, words.number()?, words.number()?);
     }
-    words.expect("endloop")?;
-    words.expect("endfacet")?;
+    words.end("endloop")?;
+    words.end_of_facet()?;
     Ok(corners)
+}
+
+/// Whether a word is `endsolid`, which some programs write in one with the name.
+fn ends_solid(word: &[u8]) -> bool {
+    const END: &str = "endsolid";
+    word.get(..END.len()).is_some_and(|start| is(start, END))
+}
+
+fn is_color(word: &[u8]) -> bool {
+    is(word, "color") || is(word, "colour")
 }
 
 /// Whether a word is this keyword, in any case.
@@ -135,6 +147,49 @@ impl<'a> Words<'a> {
     fn expect(&mut self, keyword: &str) -> Result<(), Diagnostic> {
         let word = self.next().unwrap_or_default();
         if is(word, keyword) { Ok(()) } else { Err(self.fault(word, &format!("`{keyword}`"))) }
+    }
+
+    /// What stands next stays there.
+    fn peek(&mut self) -> &'a [u8] {
+        let (at, line) = (self.words.at, self.words.line);
+        let word = self.next().unwrap_or_default();
+        (self.words.at, self.words.line) = (at, line);
+        word
+    }
+
+    /// Passes over a colour, to the end of its line.
+    fn pass_color(&mut self) {
+        if is_color(self.peek()) {
+            self.words.find();
+            self.words.rest_of_line();
+        }
+    }
+
+    /// A keyword that begins with `end`, in one word or two.
+    fn end(&mut self, keyword: &str) -> Result<(), Diagnostic> {
+        match keyword.strip_prefix("end").filter(|_| is(self.peek(), "end")) {
+            Some(rest) => {
+                self.next();
+                self.expect(rest)
+            }
+            None => self.expect(keyword),
+        }
+    }
+
+    /// `endfacet`, and what some programs write behind it on its line, the three parts of a colour; others write nothing at all.
+    fn end_of_facet(&mut self) -> Result<(), Diagnostic> {
+        let next = self.peek();
+        if is(next, "facet") || ends_solid(next) {
+            return Ok(());
+        }
+        self.end("endfacet")?;
+        for _ in 0..3 {
+            let at = self.words.at;
+            if self.words.next_in_line().is_some_and(|word| word.first().is_some_and(u8::is_ascii_alphabetic)) {
+                self.words.at = at;
+            }
+        }
+        Ok(())
     }
 
     fn number(&mut self) -> Result<f64, Diagnostic> {

@@ -33,6 +33,39 @@ fn indices_that_point_outside_are_refused_with_their_numbers() {
 }
 
 #[test]
+fn the_index_of_a_restart_is_a_vertex_where_there_is_one() {
+    let mut file = Builder::new();
+    let corners = (0..256).flat_map(|i| [i as f32, if i % 2 == 0 { 0.0 } else { 1.0 }, 0.0]).collect::<Vec<_>>();
+    let positions = file.floats("VEC3", &corners);
+    let view = file.view(&[253, 254, 255], &[]);
+    let indices =
+        file.push("accessors", json!({"bufferView": view, "componentType": 5121, "type": "SCALAR", "count": 3}));
+    file.primitive(json!({"attributes": {"POSITION": positions}, "indices": indices}));
+    let loaded = file.load();
+    assert_eq!(loaded.scene.meshes[0].positions[2], Vec3::new(255.0, 1.0, 0.0));
+    let told = loaded.warnings.iter().find(|w| w.code == "gltf-accessor-index-primitive-restart").unwrap();
+    assert!(told.text.contains("here it is a vertex"), "{told}");
+}
+
+#[test]
+fn attributes_with_too_few_or_too_many_values_are_left_out() {
+    for count in [2, 4] {
+        let mut file = Builder::new();
+        let positions = file.triangle();
+        let normals = file.floats("VEC3", [0.0, 0.0, 1.0].repeat(count).as_slice());
+        let uvs = file.floats("VEC2", [0.5, 0.5].repeat(count).as_slice());
+        file.primitive(json!({"attributes": {"NORMAL": normals, "POSITION": positions, "TEXCOORD_0": uvs, "_D": uvs}}));
+        let loaded = file.load();
+        assert_eq!(loaded.scene.meshes[0].triangles, [[0, 1, 2]]);
+        assert!(loaded.scene.meshes[0].normals.is_empty() && loaded.scene.meshes[0].uvs.iter().all(Vec::is_empty));
+        let code = "gltf-mesh-primitive-unequal-accessor-count";
+        let told: Vec<String> = loaded.warnings.iter().filter(|w| w.code == code).map(ToString::to_string).collect();
+        let said = format!("NORMAL: {count} elements for 3 vertices; the attribute is left out");
+        assert!(told.iter().any(|line| line.contains(&said)), "{told:?}");
+    }
+}
+
+#[test]
 fn interleaved_attributes_are_read_by_their_stride() {
     let mut file = Builder::new();
     let vertex = |p: [f32; 3]| [p[0], p[1], p[2], 0.0, 0.0, 1.0];

@@ -1,0 +1,132 @@
+//! Parts that a picture can do without, taken out of the JSON where they are not what the format says.
+//!
+//! What programs write for "not given", `null` and an index of −1, goes before anything looks at it. Then the schema is
+//! checked: a property of a material, a texture, a sampler or a light that breaks it goes, and with it whatever cannot be
+//! without it (a reference to a texture without its index). What holds the shape of a model together is never mended.
+
+use super::codes::Code;
+use super::report::Report;
+use super::schema;
+use serde_json::{Map, Value, json};
+
+/// Properties that are indices, and may be left out.
+const INDICES: [&str; 13] = [
+    "bufferView",
+    "camera",
+    "index",
+    "indices",
+    "light",
+    "material",
+    "mesh",
+    "sampler",
+    "scene",
+    "skeleton",
+    "skin",
+    "source",
+    "texCoord",
+];
+
+/// Takes out what says that nothing is given.
+pub(super) fn take_out_blanks(root: &mut Value, report: &mut Report) {
+    let nodes = root.get_mut("nodes").and_then(Value::as_array_mut).into_iter().flatten();
+    let blank_nodes: u64 = nodes.filter(|node| node.is_null()).map(|node| (*node = json!({}), 1).1).sum();
+    let blanks = blanks_in(root) + blank_nodes;
+    if blanks > 0 {
+        let text = "null, or -1 as an index, counts as not given";
+        let count = if blanks > 1 { format!(" ({blanks} times)") } else { String::new() };
+        report.note("gltf-blank", "", format!("{text}{count}"), "");
+    }
+}
+
+fn blanks_in(value: &mut Value) -> u64 {
+    match value {
+        Value::Object(map) => {
+            let before = map.len();
+            map.retain(|name, value| !(value.is_null() || is_none(value) && INDICES.contains(&name.as_str())));
+            let gone = (before - map.len()) as u64;
+            gone + map.values_mut().map(blanks_in).sum::<u64>()
+        }
+        Value::Array(list) => list.iter_mut().map(blanks_in).sum(),
+        _ => 0,
+    }
+}
+
+/// Whether a number is −1.
+fn is_none(value: &Value) -> bool {
+    value.as_f64() == Some(-1.0)
+}
+
+/// Makes the first buffer of a GLB as long as the chunk that holds it, where it is said to be shorter than its views need.
+pub(super) fn lengthen_buffer(root: &mut Value, chunk: Option<&[u8]>, report: &mut Report) {
+    let whole = |value: &Value, name: &str| value.get(name).and_then(schema::whole);
+    let views = schema::list(root, "bufferViews").iter().filter(|view| whole(view, "buffer") == Some(0));
+    let end =
+        |view: &Value| whole(view, "byteOffset").unwrap_or(0).saturating_add(whole(view, "byteLength").unwrap_or(0));
+    let needed = views.map(end).max().unwrap_or(0);
+    let (Some(chunk), Some(buffer)) = (chunk, root.pointer_mut("/buffers/0").and_then(Value::as_object_mut)) else {
+        return;
+    };
+    let said = buffer.get("byteLength").map_or(Some(0), schema::whole);
+    let is_short = said.is_some_and(|said| said < needed) && needed <= chunk.len() as u64;
+    if is_short && !buffer.contains_key("uri") {
+        let text = format!("{} bytes are declared, its views need {needed}", said.unwrap_or(0));
+        let remedy = "what the file has is read";
+        report.warn_with(Code::BufferByteLengthMismatch, "buffers[0]", text, remedy);
+        buffer.insert("byteLength".into(), json!(chunk.len()));
+    }
+}
+
+/// Checks the schema, and takes out what breaks it in parts that can be left out.
+pub(super) fn check(root: &mut Value, report: &mut Report) {
+    /// A property, what cannot be without it, and what cannot be without that.
+    const ROUNDS: usize = 4;
+    report.leaves_out(true);
+    schema::check(root, report);
+    report.leaves_out(false);
+    for _ in 0..ROUNDS {
+        let broken = report.take_broken();
+        if broken.is_empty() {
+            return;
+        }
+        // From the end on, so that places before stay what they are.
+        broken.iter().rev().for_each(|place| take_out(root, place));
+        // Only what now lacks something is new.
+        let mut again = Report::new(report.file());
+        again.leaves_out(true);
+        schema::check(root, &mut again);
+        report.break_more(again.take_broken());
+    }
+    // What is still broken is beyond mending: it is refused.
+    if !report.take_broken().is_empty() {
+        schema::check(root, report);
+    }
+}
+
+/// Takes out the value at a JSON path; of a list at the root an element becomes one that says nothing, of a list elsewhere the
+/// list goes.
+fn take_out(root: &mut Value, place: &str) {
+    let Some((parent, last)) = place.rsplit_once('.') else {
+        // An element of a list at the root.
+        let element = step(root, place).into_iter();
+        return element.for_each(|element| *element = Value::Object(Map::new()));
+    };
+    let parent = parent.split('.').try_fold(root, step);
+    let (name, is_element) = last.split_once('[').map_or((last, false), |(name, _)| (name, true));
+    let Some(map) = parent.and_then(Value::as_object_mut) else { return };
+    match step_in(map, last) {
+        // A light must say what it is: one that does not is dark.
+        Some(light) if is_element && name == "lights" => *light = json!({"type": "point", "intensity": 0}),
+        _ => _ = map.remove(name),
+    }
+}
+
+/// What a step of a path, `name` or `name[3]`, leads to.
+fn step<'a>(value: &'a mut Value, step: &str) -> Option<&'a mut Value> {
+    step_in(value.as_object_mut()?, step)
+}
+
+fn step_in<'a>(map: &'a mut Map<String, Value>, step: &str) -> Option<&'a mut Value> {
+    let (name, rest) = step.split_once('[').unwrap_or((step, ""));
+    let indices = rest.split(['[', ']']).filter(|index| !index.is_empty());
+    indices.map(str::parse::<usize>).try_fold(map.get_mut(name)?, |value, index| value.get_mut(index.ok()?))
+}

@@ -1,0 +1,118 @@
+//! Programs that write MTL files, known by their comments, and what each writes without meaning it.
+
+use super::parse::Mtl;
+use crate::load::text::encoding::to_ascii_superset;
+use crate::math::Vec3;
+use crate::scene::color::from_srgb;
+
+/// Who wrote a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Writer {
+    /// One that is not known, or of which nothing is.
+    #[default]
+    Other,
+    /// Writes 0.8 or what was set before as `Kd` under a map that takes its place; `illum` 3 for metals, with how metallic as
+    /// `Ka` and 1000 (1 − roughness)² as `Ns`; colours in linear light.
+    Blender,
+    /// 3ds Max: writes the colour that a map takes the place of.
+    Max,
+    /// AliceVision's Meshroom: writes 0.6 as `Kd` under its maps.
+    Meshroom,
+    /// The Visualization Toolkit: writes opacity as `Tr`, and `illum` 3 for everything.
+    Vtk,
+}
+
+/// What comments of each say, in lower case.
+const NAMES: [(&str, Writer); 5] = [
+    ("blender", Writer::Blender),
+    ("3ds max", Writer::Max),
+    ("guruware", Writer::Max),
+    ("alicevision", Writer::Meshroom),
+    ("visualization toolkit", Writer::Vtk),
+];
+
+impl Writer {
+    /// Who wrote a text, by the comments that it begins with.
+    pub(super) fn of(text: &[u8]) -> Self {
+        /// Lines that are looked at.
+        const LINES: usize = 32;
+        let text = to_ascii_superset(text);
+        let lines = text.split(|&byte| matches!(byte, b'\n' | b'\r')).map(<[u8]>::trim_ascii).take(LINES);
+        let mut comments = lines.take_while(|line| line.is_empty() || line.starts_with(b"#"));
+        let known = |comment: &[u8]| {
+            let comment = String::from_utf8_lossy(comment).to_lowercase();
+            NAMES.iter().find(|(name, _)| comment.contains(name)).map(|&(_, writer)| writer)
+        };
+        comments.find_map(known).unwrap_or_default()
+    }
+
+    /// Whether a map takes the place of `Kd`, which is written all the same.
+    pub(super) fn replaces_by_maps(self) -> bool {
+        matches!(self, Self::Blender | Self::Max | Self::Meshroom)
+    }
+}
+
+/// Whether the diffuse colours are numbers of eight bits as screens show them (89 of 255 is `0.349020`): picked, and written
+/// as they were picked. They are if all of them are such numbers, to the last digit, and so many digits say so that it
+/// would be chance in one of a hundred files.
+pub(super) fn are_codes(materials: &[Mtl]) -> bool {
+    /// How likely chance may be.
+    const CHANCE: f64 = 1e-2;
+    let mut all: Vec<f64> = materials.iter().filter_map(|mtl| mtl.kd).flatten().collect();
+    all.sort_unstable_by(f64::total_cmp);
+    all.dedup();
+    let chance = all.into_iter().map(chance_of_code).try_fold(1.0, |all, one| Some(all * one?));
+    chance.is_some_and(|chance| chance < CHANCE)
+}
+
+/// How likely it is that a number with so many digits is one of eight bits by chance; `None` where it is none.
+fn chance_of_code(number: f64) -> Option<f64> {
+    const CODES: f64 = 255.0;
+    // Zeros at the end were not kept, so that some numbers seem to have a digit less, and say less.
+    let written = number.to_string();
+    let digits = written.split_once('.').map_or(0, |(_, places)| places.len());
+    let half = 0.5 * libm::exp10(-(digits as f64));
+    let off = (number - (number * CODES).round() / CODES).abs();
+    // Some cut the digits that they do not write.
+    ((0.0..=1.0).contains(&number) && off <= 2.0 * half).then_some((4.0 * half * CODES).min(1.0))
+}
+
+/// The light of a colour of screens, each part 0…1.
+pub(super) fn light(code: [f64; 3]) -> [f64; 3] {
+    #[expect(clippy::cast_possible_truncation, reason = "colours become f32")]
+    let linear: Vec3 = from_srgb(code.map(|part| part as f32));
+    linear.to_array().map(f64::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn programs_are_known_by_the_comments_at_the_beginning() {
+        let of = |text: &str| Writer::of(text.as_bytes());
+        assert_eq!(of("# Blender 4.2.1 MTL File: 'None'\n# www.blender.org\n"), Writer::Blender);
+        assert_eq!(of("#\n# 3ds Max Wavefront OBJ Exporter v0.97b\n"), Writer::Max);
+        assert_eq!(of("\r\n# wavefront mtl file written by the visualization toolkit\r\n"), Writer::Vtk);
+        assert_eq!(of("newmtl a\n# Blender\n"), Writer::Other);
+        assert_eq!(of(""), Writer::Other);
+    }
+
+    #[test]
+    fn colors_of_eight_bits_are_told_from_others_by_their_digits() {
+        let are = |colors: &[[f64; 3]]| {
+            let of = |&kd: &[f64; 3]| Mtl { kd: Some(kd), ..Mtl::default() };
+            are_codes(&colors.iter().map(of).collect::<Vec<_>>())
+        };
+        // 3ds Max, SketchUp and Tinkercad.
+        assert!(are(&[[0.1098, 0.3490, 0.6941]]));
+        assert!(are(&[[0.400000, 0.298039, 0.000000], [1.0, 1.0, 1.0]]));
+        assert!(are(&[[0.27450980392156865, 0.7176470588235294, 0.28627450980392155]]));
+        // By hand, by halves, of Blender, and one that is none among others.
+        assert!(!are(&[[0.8, 0.2, 0.4], [0.6, 0.6, 0.6], [0.1, 0.9, 0.0]]));
+        assert!(!are(&[[0.5, 0.25, 0.125]]));
+        assert!(!are(&[[0.8, 0.026241, 0.115]]));
+        assert!(!are(&[[0.1098, 0.3490, 0.6941], [0.3452, 0.1, 0.1]]));
+        assert!(!are(&[[0.0, 1.0, 0.0]]) && !are(&[]));
+    }
+}
