@@ -1,11 +1,12 @@
 //! The bytes that buffers and buffer views stand for.
 
 use super::codes::Code;
+use super::elsewhere;
 use super::meshopt::{self, Decoded};
 use super::report::Report;
 use crate::load::Diagnostic;
 use crate::load::limits::{Budget, OverBudget};
-use crate::load::paths::{FileFault, Resolver, shorten};
+use crate::load::paths::{FileFault, Resolver, shorten, taken_from};
 use base64::Engine as _;
 use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
@@ -43,7 +44,7 @@ impl<'a> Buffers<'a> {
     ) -> Self {
         let mut buffers = Self { root, slots: Vec::with_capacity(root.buffers.len()), decoded: Decoded::new() };
         let mut known: HashMap<&str, usize> = HashMap::new();
-        let mut find = Find { bin, file, resolver, budget, report };
+        let mut find = Find { bin, file, resolver, budget, report, missed: 0 };
         let stand_ins = stand_ins(root);
         for (i, buffer) in root.buffers.iter().enumerate() {
             let named = buffer.uri.as_deref().filter(|uri| !is_data(uri));
@@ -170,6 +171,8 @@ struct Find<'a, 'b> {
     resolver: &'b mut Resolver,
     budget: &'b mut Budget,
     report: &'b mut Report,
+    /// Names that were found nowhere.
+    missed: usize,
 }
 
 impl<'a> Find<'a, '_> {
@@ -216,15 +219,26 @@ impl<'a> Find<'a, '_> {
                 Slot::Bytes(Cow::Owned(found.bytes))
             }
             Ok(Err(over)) => self.too_large(place, over),
-            Err(why) => {
+            Err(why) => self.named_elsewhere(uri, place).unwrap_or_else(|| {
                 let fault = why.diagnose(self.file, place);
                 match why {
                     FileFault::BadUri(_) => self.report.add(Code::InvalidUri, &fault.place, fault.text.clone()),
                     _ => self.report.warnings.push(fault.clone()),
                 }
                 Slot::Failed(fault)
-            }
+            }),
         }
+    }
+
+    /// The same of a buffer that its name does not lead to.
+    fn named_elsewhere(&mut self, uri: &str, place: &str) -> Option<Slot<'a>> {
+        let path = elsewhere::find(uri, self.resolver, &mut self.missed)?;
+        let text = taken_from(uri, &path);
+        self.report.warnings.push(Diagnostic::new("file-elsewhere", self.file, place, text));
+        Some(match self.resolver.read_file_within(&path, self.budget).ok()? {
+            Ok(bytes) => Slot::Bytes(Cow::Owned(bytes)),
+            Err(over) => self.too_large(place, over),
+        })
     }
 
     fn too_large(&mut self, place: &str, over: OverBudget) -> Slot<'a> {

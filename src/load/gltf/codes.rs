@@ -65,7 +65,7 @@ codes! {
     GlbUnexpectedBinChunk "GLB_UNEXPECTED_BIN_CHUNK" Warn "it is found wherever it stands";
     GlbUnknownChunkType "GLB_UNKNOWN_CHUNK_TYPE" Accept "unknown chunks are to be skipped";
     GlbExtraData "GLB_EXTRA_DATA" Warn "bytes after the last chunk are not read";
-    InvalidJson "INVALID_JSON" Refuse "nothing can be known; only a byte-order mark is skipped with a warning";
+    InvalidJson "INVALID_JSON" Refuse "nothing can be known; a byte-order mark, and names that are not UTF-8, are warned about";
     IoError "IO_ERROR" Refuse "geometry is missing; a missing image is a warning";
 
     // Shape of the JSON.
@@ -76,7 +76,7 @@ codes! {
     InvalidIndex "INVALID_INDEX" Refuse "what is referred to is unknown";
     InvalidUri "INVALID_URI" Refuse "the data cannot be found";
     OneOfMismatch "ONE_OF_MISMATCH" Refuse "which of them counts is unknown";
-    PatternMismatch "PATTERN_MISMATCH" Refuse "the version decides how everything else is read";
+    PatternMismatch "PATTERN_MISMATCH" Refuse "the version decides how everything else is read; 2 and 2.0.1 are clear enough";
     TypeMismatch "TYPE_MISMATCH" Refuse "what is meant is unknown";
     UndefinedProperty "UNDEFINED_PROPERTY" Refuse "a part that everything else hangs on is missing";
     UnexpectedProperty "UNEXPECTED_PROPERTY" Accept "unknown properties are to be skipped";

@@ -33,10 +33,12 @@ pub(super) fn check_depth(weight: &Weight, report: &mut Report) {
 /// Parses and checks JSON; `None` when that is impossible, with the reason in `report`.
 pub(super) fn parse(json: &[u8], report: &mut Report) -> Option<Value> {
     let text = match std::str::from_utf8(json) {
-        Ok(text) => text,
+        Ok(text) => text.into(),
+        // Some exporters write names as the system codes them.
         Err(e) => {
-            report.add(Code::InvalidJson, "", format!("the JSON is not UTF-8 at byte {}", e.valid_up_to()));
-            return None;
+            let text = format!("the JSON is not UTF-8 at byte {}", e.valid_up_to());
+            report.warn_with(Code::InvalidJson, "", text, "what cannot be read is replaced");
+            String::from_utf8_lossy(json)
         }
     };
     // GLB pads its JSON with spaces; some exporters use zeros.

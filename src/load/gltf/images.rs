@@ -2,11 +2,11 @@
 
 use super::buffers::{Buffers, decode_data, is_data, media_type};
 use super::codes::Code;
+use super::elsewhere;
 use super::gloss;
 use super::report::Report;
 use super::textures::Picture;
 use crate::load::limits::{Budget, Limits, OverBudget};
-use crate::load::mtl::Finder;
 use crate::load::paths::{Resolver, taken_from};
 use crate::load::texture::{Encoded, Unusable, decode_all, format_of, take_memory};
 use crate::load::{Diagnostic, ktx};
@@ -14,10 +14,9 @@ use crate::scene::{Bitmap, Pixels};
 use crate::stopwatch::Spent;
 use ::image::ImageFormat;
 use gltf::json::{Index, Root, image::Image, texture::Texture};
-use percent_encoding::percent_decode_str;
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The bytes of every image that is drawn or lies in the file itself.
 pub(super) struct Images<'a> {
@@ -155,7 +154,7 @@ impl<'a> Find<'a, '_> {
                 self.leave_out(i, over);
                 None
             }
-            Err(why) => match self.elsewhere(uri) {
+            Err(why) => match elsewhere::find(uri, self.resolver, self.missed) {
                 Some(path) => {
                     let text = taken_from(uri, &path);
                     self.report.warnings.push(Diagnostic::new("file-elsewhere", self.file, &place, text));
@@ -168,19 +167,6 @@ impl<'a> Find<'a, '_> {
                 }
             },
         }
-    }
-
-    /// Where a picture lies that its name does not lead to: the name is often that of another machine. Nothing is looked for
-    /// in place of what is on the net.
-    fn elsewhere(&mut self, uri: &str) -> Option<PathBuf> {
-        let name = percent_decode_str(uri.split('?').next()?).decode_utf8().ok()?;
-        if uri.contains("://") {
-            return None;
-        }
-        let mut finder = Finder { resolver: self.resolver, missed: *self.missed };
-        let found = finder.find(&name, &[Path::new("")]);
-        *self.missed = finder.missed;
-        found.ok().map(|place| place.path)
     }
 
     /// Whether so many bytes may still be taken; else the image is left out with a warning.

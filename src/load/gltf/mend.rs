@@ -41,10 +41,15 @@ pub(super) fn take_out_blanks(root: &mut Value, report: &mut Report) {
 fn blanks_in(value: &mut Value) -> u64 {
     match value {
         Value::Object(map) => {
-            let before = map.len();
-            map.retain(|name, value| !(value.is_null() || is_none(value) && INDICES.contains(&name.as_str())));
-            let gone = (before - map.len()) as u64;
-            gone + map.values_mut().map(blanks_in).sum::<u64>()
+            // What may be anything may be null.
+            let is_null = |name: &str, value: &Value| value.is_null() && name != "extras";
+            let is_blank =
+                |name: &str, value: &Value| is_null(name, value) || is_none(value) && INDICES.contains(&name);
+            let blanks = map.iter().filter(|(name, value)| is_blank(name, value)).count() as u64;
+            if blanks > 0 {
+                map.retain(|name, value| !is_blank(name, value));
+            }
+            blanks + map.values_mut().map(blanks_in).sum::<u64>()
         }
         Value::Array(list) => list.iter_mut().map(blanks_in).sum(),
         _ => 0,

@@ -30,6 +30,7 @@ mod draco_points;
 mod draco_stream;
 #[cfg(feature = "draco")]
 mod draco_survey;
+mod elsewhere;
 mod extensions;
 mod faces;
 mod gloss;

@@ -15,6 +15,11 @@ pub(super) fn check(root: &Value, report: &mut Report) -> bool {
     match numbers(version) {
         // The files of glTF 1.0's time were as free with this as with the rest.
         None if version.starts_with("1.") || version == "1" => one(version, Code::PatternMismatch, report),
+        None if version == "2" || version.starts_with("2.0.") => {
+            let text = format!("version '{}' is not of the form 2.0", crate::load::paths::shorten(version));
+            report.warn_with(Code::PatternMismatch, "asset.version", text, "it is read as 2.0");
+            true
+        }
         None => {
             let text = format!("version '{}' is not of the form 2.0", crate::load::paths::shorten(version));
             report.add(Code::PatternMismatch, "asset.version", text);

@@ -130,7 +130,7 @@ fn what_says_that_nothing_is_given_counts_as_not_given() {
     let loaded = file.load();
     assert_eq!((loaded.facts.faces, codes(&loaded)), (1, vec!["gltf-blank"]));
     let told = loaded.warnings.iter().find(|w| w.code == "gltf-blank").unwrap();
-    assert_eq!(told.text, "null, or -1 as an index, counts as not given (9 times)");
+    assert_eq!(told.text, "null, or -1 as an index, counts as not given (8 times)");
     // What must be there is missing all the same.
     let mut file = Builder::new();
     let positions = file.triangle();
@@ -173,8 +173,8 @@ fn a_buffer_that_is_said_to_be_shorter_than_its_chunk_is_read_as_far_as_its_view
     let mut file = Builder::new();
     let positions = file.triangle();
     file.primitive(json!({"attributes": {"POSITION": positions}}));
-    let (glb, said) = (file.glb(), format!("\"byteLength\":{}}}]", file.bytes.len()));
-    let other = format!("{:<1$}", "\"byteLength\":9}]", said.len());
+    let said = |bytes: usize| format!("\"buffers\":[{{\"byteLength\":{bytes}}}]");
+    let (glb, said, other) = (file.glb(), said(file.bytes.len()), said(9) + " ");
     let at = glb.windows(said.len()).position(|part| part == said.as_bytes()).unwrap();
     let mut changed = glb.clone();
     changed[at..at + said.len()].copy_from_slice(other.as_bytes());
@@ -231,4 +231,44 @@ fn pictures_are_looked_for_beside_the_model_whatever_machine_they_were_on() {
         let is_told = loaded.warnings.iter().any(|w| w.code == "file-elsewhere");
         assert_eq!(is_told, found && uri != "textures/tex%20a.png", "{uri}: {:?}", loaded.warnings);
     }
+}
+
+#[test]
+fn buffers_are_looked_for_beside_the_model_too() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    file.primitive(json!({"attributes": {"POSITION": positions}}));
+    std::fs::write(dir.path().join("mesh.bin"), &file.bytes).unwrap();
+    let mut root: Value = serde_json::from_slice(&file.gltf()).unwrap();
+    let mut load = |uri: &str| {
+        root["buffers"][0]["uri"] = json!(uri);
+        let source = crate::load::Source { path: dir.path().join("m.gltf"), bytes: root.to_string().into_bytes() };
+        crate::load::load_source(&source, &LoadOptions::default())
+    };
+    for uri in ["C:\\Users\\me\\mesh.bin", "/home/me/mesh.bin", "data/mesh.bin"] {
+        let loaded = load(uri).unwrap();
+        assert_eq!((loaded.facts.faces, codes(&loaded)), (1, vec!["file-elsewhere"]), "{uri}");
+    }
+    assert!(load("https://example.org/mesh.bin").is_err() && load("other.bin").is_err());
+}
+
+#[test]
+fn names_in_another_coding_and_versions_with_more_or_fewer_numbers_are_read() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    file.primitive(json!({"attributes": {"POSITION": positions}}));
+    file.set("nodes", json!([{"mesh": 0, "name": "?"}]));
+    let mut bytes = file.gltf();
+    let at = bytes.iter().position(|&byte| byte == b'?').unwrap();
+    bytes[at] = 0xfc;
+    let loaded = load(&bytes);
+    assert_eq!((loaded.facts.faces, codes(&loaded)), (1, vec!["gltf-invalid-json"]));
+    for version in ["2", "2.0.1"] {
+        file.root["asset"]["version"] = json!(version);
+        let loaded = file.load();
+        assert_eq!((loaded.facts.faces, codes(&loaded)), (1, vec!["gltf-pattern-mismatch"]), "{version}");
+    }
+    file.root["asset"]["version"] = json!("two");
+    assert!(file.fault().contains("'two' is not of the form 2.0"));
 }
