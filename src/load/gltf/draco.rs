@@ -235,12 +235,12 @@ impl Plan<'_> {
     fn compare(&self, output: &Output, report: &mut Report) {
         let (corners, vertices) = (output.indices.len() as u64, output.vertices);
         if (corners, vertices) != (self.indices.1, self.declared) {
-            let Diagnostic { file, place, .. } = self.task.fault("", "");
+            let Task { file, place, .. } = &self.task;
             let text = format!(
                 "the stream has {vertices} vertices and {corners} indices, but the accessors declare {} and {}",
                 self.declared, self.indices.1
             );
-            let warning = Diagnostic::new("gltf-draco-count", file, place, text);
+            let warning = Diagnostic::new("gltf-draco-count", file, place.as_str(), text);
             report.warnings.push(warning.remedy("those of the stream are drawn"));
         }
     }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 /// Where such a file lies, if it does; `missed` counts the names that were found nowhere. Nothing is looked for in place of
 /// what is on a network.
 pub(super) fn find(uri: &str, resolver: &mut Resolver, missed: &mut usize) -> Option<PathBuf> {
+    let uri = uri.strip_prefix("file://").unwrap_or(uri);
     if uri.contains("://") {
         return None;
     }

@@ -93,8 +93,7 @@ pub(super) fn check(root: &mut Value, report: &mut Report) {
         if broken.is_empty() {
             return;
         }
-        // From the end on, so that places before stay what they are.
-        broken.iter().rev().for_each(|place| take_out(root, place));
+        broken.iter().for_each(|place| take_out(root, place));
         // Only what now lacks something is new.
         let mut again = Report::new(report.file());
         again.leaves_out(true);

@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 /// Faults listed before the rest is only counted.
 const SHOWN: usize = 20;
 
+/// Parts that are left out at most: each is remembered.
+const LEFT_OUT: usize = 1 << 16;
+
 /// Faults that refuse the file, and warnings.
 #[derive(Clone, Debug)]
 pub(super) struct Report {
@@ -54,7 +57,7 @@ impl Report {
 
     /// Files a fault that refuses the file whatever the table says of the milder cases of its code.
     pub(super) fn refuse(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>) {
-        if self.leaves_out && codes::can_be_left_out(place.as_ref()) {
+        if self.leaves_out && codes::can_be_left_out(place.as_ref()) && self.broken.len() < LEFT_OUT {
             self.broken.push(place.as_ref().to_owned());
             return self.warn_with(code, place, text, "it is left out");
         }

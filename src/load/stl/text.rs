@@ -18,8 +18,8 @@ const FACET: u64 = 3 * 3 * size_of::<DVec3>() as u64;
 /// Reads every triangle.
 ///
 /// # Errors
-/// At the first word that is out of place, with its line; colours never are. A solid without its end may be whole all the same; a warning says
-/// so.
+/// At the first word that is out of place, with its line; colours never are. A solid without its end may be whole all the
+/// same; a warning says so.
 pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnostic> {
     // Zeros fill the last block of what was copied in blocks.
     let length = source.bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);

@@ -214,6 +214,7 @@ fn pictures_are_looked_for_beside_the_model_whatever_machine_they_were_on() {
         ("textures/tex%20a.png", true),
         ("C:\\Users\\me\\textures\\tex a.png", true),
         ("/home/me/tex%20a.png", true),
+        ("file:///C:/Users/me/tex%20a.png", true),
         ("tex%20a.png?v=12", true),
         ("tex%20a.tga", true),
         ("https://example.org/textures/tex%20a.png", false),
