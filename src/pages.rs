@@ -12,8 +12,8 @@
 //! Nor do they where memory must first be fetched: a virtual machine that tells its host of free memory (Linux, free page
 //! reporting) has given away just that of which large pages are made, and gets it back in small pieces. That takes 20 times
 //! as long as to clear it (measured: 4.5 ms a page instead of 0.2), where small pages are made of what was in use before.
-//! So large pages are made one by one, and no more of them once those that took long have taken more than [`allow`] says: what
-//! they are worth depends on how many rays will be sent.
+//! So some large pages of an array are made before the others, and no more of any once those that took long have taken more
+//! than [`allow`] says: what they are worth depends on how many rays will be sent.
 
 use std::fmt;
 use std::ops::{Deref, DerefMut};
@@ -35,10 +35,15 @@ const WORTH_PAGE: usize = PAGE / 2;
 /// A large page is dear if to make it takes the processor longer: twice as long as to make small ones in its place.
 const DEAR: Duration = Duration::from_micros(1500);
 
-/// What dear pages may still take, nanoseconds of the processor.
-static ALLOWANCE: AtomicU64 = AtomicU64::new(u64::MAX);
+/// How many large pages of an array are made before it is written to, at most: every eighth, or fewer of a larger one. To make
+/// all of them takes longer, since they are out of the caches when they are written, and memory that is perhaps never used.
+const TRIED: usize = 16;
 
-/// Lets large pages that are dear take so much time of the processor from now on, all of them together; before, any.
+/// What dear pages may still take, nanoseconds of the processor.
+static ALLOWANCE: AtomicU64 = AtomicU64::new(20_000_000);
+
+/// Lets large pages that are found to be dear take so much time of the processor from now on, all of them together; before,
+/// 20 ms.
 pub fn allow(time: Duration) {
     let nanoseconds = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
     ALLOWANCE.store(nanoseconds.max(1), Ordering::Relaxed);
@@ -83,7 +88,8 @@ impl Large {
         let mut map = MmapMut::map_anon(whole.checked_add(PAGE)?).ok()?;
         let start = map.as_ptr().align_offset(PAGE);
         map.advise_range(Advice::HugePage, start, whole).ok()?;
-        let are_dear = map[start..][..whole].chunks_exact_mut(PAGE).any(|page| {
+        let apart = (whole / PAGE / TRIED).max(8);
+        let are_dear = map[start..][..whole].chunks_exact_mut(PAGE).step_by(apart).any(|page| {
             let watch = Stopwatch::of_this_thread();
             // The system makes a page when it is written to.
             page[0] = 0;
@@ -225,8 +231,9 @@ mod tests {
         dear.map[dear.start..].chunks_mut(4096).for_each(|page| page[0] = 1);
         assert!(kibibytes_in_large_pages(&dear) <= 2048);
         let allowance = AtomicU64::new(u64::MAX);
-        let Some(cheap) = Large::new(4 * PAGE, Duration::ZERO, &allowance) else { return };
+        let Some(mut cheap) = Large::new(4 * PAGE, Duration::ZERO, &allowance) else { return };
         assert!((1..u64::MAX).contains(&allowance.load(Ordering::Relaxed)));
+        cheap.map[cheap.start..].chunks_mut(4096).for_each(|page| page[0] = 1);
         let [made, granted] = [&cheap, &dear].map(kibibytes_in_large_pages);
         assert!(made == 4 * 2048 || granted == 0, "{made} where {granted} were granted");
     }

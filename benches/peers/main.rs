@@ -14,7 +14,7 @@ mod tracer;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use meshray::accel::{AccelChoice, AccelParams, Kept, NO_PRIM, Pencil, RayOrder, Splitting, Wide, auto};
 use meshray::bench::clock::{Spread, processor_seconds};
@@ -70,6 +70,7 @@ fn main() -> ExitCode {
         return ExitCode::FAILURE;
     }
     println!("{}", words.simd.name());
+    meshray::pages::allow(Duration::MAX);
     let shared = std::env::var_os("MESHRAY_SHARED").map_or_else(|| PathBuf::from("../shared"), PathBuf::from);
     let embree = std::env::var_os("MESHRAY_EMBREE").map(|path| Embree::load(Path::new(&path), words.simd)).transpose();
     let embree = match embree {

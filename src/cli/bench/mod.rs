@@ -18,12 +18,14 @@ use crate::bench::report::{Format, Model, Rays, Report, text};
 use crate::bench::row::Row;
 use crate::bench::sweep::Sweep;
 use crate::load::{Diagnostic, Loaded};
+use crate::pages;
 use crate::render::Filters;
 use crate::render::texture::TextureStore;
 pub(super) use args::BenchArgs;
 use gate::Gate;
 use scene::{Prepared, Subject};
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// What is to be done, checked.
 struct Bench<'a> {
@@ -37,6 +39,8 @@ struct Bench<'a> {
 /// Compares on each model and tells how that ended: as the worst of them.
 pub(super) fn run(args: &BenchArgs) -> Exit {
     let messages = Messages::new(args.messages.into(), args.quiet);
+    // Rays are what is measured, many passes of them.
+    pages::allow(Duration::MAX);
     let (plan, files) = match (plan(args), files(args)) {
         (Ok(plan), Ok(files)) => (plan, files),
         (Err(wrong), _) | (_, Err(wrong)) => return messages.wrong(wrong),

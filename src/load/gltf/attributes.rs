@@ -94,6 +94,7 @@ impl<'a> Check<'a> {
             );
         }
         self.sets(attributes, &at);
+        let is_compressed = primitive.pointer("/extensions/KHR_draco_mesh_compression").is_some();
         let position = attributes.get("POSITION").and_then(|index| self.shape(index));
         let mut vertices = position.map(|shape| shape.count);
         for (name, index) in attributes {
@@ -102,7 +103,8 @@ impl<'a> Check<'a> {
             self.attribute(name, &shape, &place, false);
             match vertices {
                 None => vertices = Some(shape.count),
-                Some(count) if count != shape.count => {
+                // Of compressed values the stream says how many there are.
+                Some(count) if count != shape.count && !is_compressed => {
                     let text = format!("{} elements for {count} vertices", shape.count);
                     self.report.add(Code::MeshPrimitiveUnequalAccessorCount, place, text);
                 }
@@ -110,7 +112,7 @@ impl<'a> Check<'a> {
             }
         }
         let corners = self.indices(primitive, place).or(vertices);
-        self.mode(primitive, corners, place);
+        self.mode(primitive, corners.filter(|_| !is_compressed), place);
         for (k, target) in list(primitive, "targets").iter().enumerate() {
             let place = format!("{place}.targets[{k}]");
             self.target(target, attributes, vertices, &place);

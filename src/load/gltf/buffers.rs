@@ -219,26 +219,38 @@ impl<'a> Find<'a, '_> {
                 Slot::Bytes(Cow::Owned(found.bytes))
             }
             Ok(Err(over)) => self.too_large(place, over),
-            Err(why) => self.named_elsewhere(uri, place).unwrap_or_else(|| {
-                let fault = why.diagnose(self.file, place);
-                match why {
-                    FileFault::BadUri(_) => self.report.add(Code::InvalidUri, &fault.place, fault.text.clone()),
-                    _ => self.report.warnings.push(fault.clone()),
+            Err(why) => match elsewhere::find(uri, &why, self.resolver, &mut self.missed) {
+                Some(path) => {
+                    if elsewhere::is_near(uri, &why) {
+                        self.report.warnings.push(why.diagnose(self.file, place));
+                    }
+                    self.named_elsewhere(uri, &path, place)
                 }
-                Slot::Failed(fault)
-            }),
+                None => self.failed(&why, place),
+            },
         }
     }
 
-    /// The same of a buffer that its name does not lead to.
-    fn named_elsewhere(&mut self, uri: &str, place: &str) -> Option<Slot<'a>> {
-        let path = elsewhere::find(uri, self.resolver, &mut self.missed)?;
-        let text = taken_from(uri, &path);
-        self.report.warnings.push(Diagnostic::new("file-elsewhere", self.file, place, text));
-        Some(match self.resolver.read_file_within(&path, self.budget).ok()? {
-            Ok(bytes) => Slot::Bytes(Cow::Owned(bytes)),
-            Err(over) => self.too_large(place, over),
-        })
+    /// The bytes of a buffer that lies where its name does not lead to.
+    fn named_elsewhere(&mut self, uri: &str, path: &Path, place: &str) -> Slot<'a> {
+        match self.resolver.read_file_within(path, self.budget) {
+            Ok(Ok(bytes)) => {
+                let text = taken_from(uri, path);
+                self.report.warnings.push(Diagnostic::new("file-elsewhere", self.file, place, text));
+                Slot::Bytes(Cow::Owned(bytes))
+            }
+            Ok(Err(over)) => self.too_large(place, over),
+            Err(why) => self.failed(&why, place),
+        }
+    }
+
+    fn failed(&mut self, why: &FileFault, place: &str) -> Slot<'a> {
+        let fault = why.diagnose(self.file, place);
+        match why {
+            FileFault::BadUri(_) => self.report.add(Code::InvalidUri, &fault.place, fault.text.clone()),
+            _ => self.report.warnings.push(fault.clone()),
+        }
+        Slot::Failed(fault)
     }
 
     fn too_large(&mut self, place: &str, over: OverBudget) -> Slot<'a> {

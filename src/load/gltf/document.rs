@@ -11,6 +11,7 @@ use super::weight::{DEEPEST, Weight};
 use gltf::json::{Camera, Root};
 use serde::Deserialize;
 use serde_json::{Map, Number, Value, json};
+use std::borrow::Cow;
 
 /// A document whose types and indices are right.
 pub(super) struct Document {
@@ -30,17 +31,17 @@ pub(super) fn check_depth(weight: &Weight, report: &mut Report) {
     }
 }
 
-/// Parses and checks JSON; `None` when that is impossible, with the reason in `report`.
-pub(super) fn parse(json: &[u8], report: &mut Report) -> Option<Value> {
-    let text = match std::str::from_utf8(json) {
-        Ok(text) => text.into(),
-        // Some exporters write names as the system codes them.
-        Err(e) => {
-            let text = format!("the JSON is not UTF-8 at byte {}", e.valid_up_to());
-            report.warn_with(Code::InvalidJson, "", text, "what cannot be read is replaced");
-            String::from_utf8_lossy(json)
-        }
-    };
+/// The text of JSON. Some exporters write names as their system codes them: what is not UTF-8 is replaced.
+pub(super) fn text<'a>(json: &'a [u8], report: &mut Report) -> Cow<'a, str> {
+    if let Err(e) = std::str::from_utf8(json) {
+        let text = format!("the JSON is not UTF-8 at byte {}", e.valid_up_to());
+        report.warn_with(Code::InvalidJson, "", text, "what cannot be read is replaced");
+    }
+    String::from_utf8_lossy(json)
+}
+
+/// Parses JSON; `None` when that is impossible, with the reason in `report`.
+pub(super) fn parse(text: &str, report: &mut Report) -> Option<Value> {
     // GLB pads its JSON with spaces; some exporters use zeros.
     match serde_json::from_str(text.trim_end_matches('\0')) {
         Ok(value) => Some(value),
@@ -153,8 +154,7 @@ mod tests {
 
     #[test]
     fn whole_numbers_may_be_written_as_floats_and_extras_anywhere() {
-        let json =
-            br#"{"asset": {"version": "2.0"}, "scene": 0.0, "scenes": [{"nodes": [1e0]}], "nodes": [{}, {"extras": 3}],
+        let json = r#"{"asset": {"version": "2.0"}, "scene": 0.0, "scenes": [{"nodes": [1e0]}], "nodes": [{}, {"extras": 3}],
             "materials": [{"extensions": {"KHR_materials_ior": {"ior": 2, "extras": {"a": 1}}}}]}"#;
         let mut report = Report::new(Path::new("a.gltf"));
         let value = parse(json, &mut report).unwrap();

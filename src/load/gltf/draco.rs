@@ -117,10 +117,10 @@ struct Plan<'a> {
     bytes: &'a [u8],
     /// The accessor of the indices, and how many it declares.
     indices: (usize, u64),
-    /// The accessors of the attributes, what is wanted of each, and how many values they declare.
+    /// The accessors of the attributes, what is wanted of each, and how many values it declares.
     accessors: Vec<usize>,
     wanted: Vec<Wanted>,
-    declared: u64,
+    declared: Vec<u64>,
 }
 
 /// What an accessor shows: the number of a compressed view, and in its stream an attribute, or the indices (`None`).
@@ -138,8 +138,8 @@ impl<'a> Task<'a> {
             return Ok(None);
         }
         let (counts, ..) = draco_stream::start(bytes).map_err(|text| self.fault("", text))?;
-        let declared = wanted.first().map_or(0, |w| w.most);
-        let most = counts.most_values(declared);
+        let declared: Vec<u64> = wanted.iter().map(|w| w.most).collect();
+        let most = counts.most_values(declared.iter().copied().max().unwrap_or(0));
         wanted.iter_mut().for_each(|w| w.most = most);
         let kept = wanted.iter().map(Wanted::size).fold(counts.faces.saturating_mul(12), u64::saturating_add);
         self.charge(counts.cost(most, (wanted.len() + draco_codec::SPARE) as u64).saturating_add(kept), budget)?;
@@ -234,11 +234,13 @@ impl Plan<'_> {
     /// Tells where the accessors declare other numbers than the stream has.
     fn compare(&self, output: &Output, report: &mut Report) {
         let (corners, vertices) = (output.indices.len() as u64, output.vertices);
-        if (corners, vertices) != (self.indices.1, self.declared) {
+        let other = self.declared.iter().find(|&&declared| declared != vertices);
+        if corners != self.indices.1 || other.is_some() {
             let Task { file, place, .. } = &self.task;
             let text = format!(
                 "the stream has {vertices} vertices and {corners} indices, but the accessors declare {} and {}",
-                self.declared, self.indices.1
+                other.unwrap_or(&vertices),
+                self.indices.1
             );
             let warning = Diagnostic::new("gltf-draco-count", file, place.as_str(), text);
             report.warnings.push(warning.remedy("those of the stream are drawn"));

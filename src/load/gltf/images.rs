@@ -154,18 +154,23 @@ impl<'a> Find<'a, '_> {
                 self.leave_out(i, over);
                 None
             }
-            Err(why) => match elsewhere::find(uri, self.resolver, self.missed) {
-                Some(path) => {
-                    let text = taken_from(uri, &path);
-                    self.report.warnings.push(Diagnostic::new("file-elsewhere", self.file, &place, text));
-                    let read = self.resolver.read_file_within(&path, self.budget).ok()?;
-                    read.map_err(|over| self.leave_out(i, over)).ok()
-                }
-                None => {
+            Err(why) => {
+                let found = elsewhere::find(uri, &why, self.resolver, self.missed);
+                if found.is_none() || elsewhere::is_near(uri, &why) {
                     self.report.warnings.push(why.diagnose(self.file, &place));
-                    None
                 }
-            },
+                let path = found?;
+                match self.resolver.read_file_within(&path, self.budget) {
+                    Ok(Ok(bytes)) => {
+                        let text = taken_from(uri, &path);
+                        self.report.warnings.push(Diagnostic::new("file-elsewhere", self.file, &place, text));
+                        return Some(bytes);
+                    }
+                    Ok(Err(over)) => self.leave_out(i, over),
+                    Err(why) => self.report.warnings.push(why.diagnose(self.file, &place)),
+                }
+                None
+            }
         }
     }
 

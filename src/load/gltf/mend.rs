@@ -2,7 +2,8 @@
 //!
 //! What programs write for "not given", `null` and an index of −1, goes before anything looks at it. Then the schema is
 //! checked: a property of a material, a texture, a sampler or a light that breaks it goes, and with it whatever cannot be
-//! without it (a reference to a texture without its index). What holds the shape of a model together is never mended.
+//! without it (a reference to a texture without its index); so does a name that is none. Of what holds the shape of a model
+//! together, only the length of a buffer is mended, where its bytes are there.
 
 use super::codes::Code;
 use super::report::Report;
@@ -38,18 +39,26 @@ pub(super) fn take_out_blanks(root: &mut Value, report: &mut Report) {
     }
 }
 
+/// Takes out of what the format defines; what may be anything, `extras` and extensions that are not read, is not looked into.
 fn blanks_in(value: &mut Value) -> u64 {
     match value {
         Value::Object(map) => {
-            // What may be anything may be null.
-            let is_null = |name: &str, value: &Value| value.is_null() && name != "extras";
-            let is_blank =
-                |name: &str, value: &Value| is_null(name, value) || is_none(value) && INDICES.contains(&name);
+            let is_blank = |name: &str, value: &Value| {
+                name != "extras" && (value.is_null() || is_none(value) && INDICES.contains(&name))
+            };
             let blanks = map.iter().filter(|(name, value)| is_blank(name, value)).count() as u64;
             if blanks > 0 {
                 map.retain(|name, value| !is_blank(name, value));
             }
-            blanks + map.values_mut().map(blanks_in).sum::<u64>()
+            let defined = map.iter_mut().filter(|(name, _)| *name != "extras");
+            let inside = defined.map(|(name, value)| match value {
+                Value::Object(extensions) if name == "extensions" => {
+                    let known = extensions.iter_mut().filter(|(name, _)| schema::is_known_extension(name));
+                    known.map(|(_, extension)| blanks_in(extension)).sum()
+                }
+                value => blanks_in(value),
+            });
+            blanks + inside.sum::<u64>()
         }
         Value::Array(list) => list.iter_mut().map(blanks_in).sum(),
         _ => 0,
@@ -85,23 +94,24 @@ pub(super) fn lengthen_buffer(root: &mut Value, chunk: Option<&[u8]>, report: &m
 pub(super) fn check(root: &mut Value, report: &mut Report) {
     /// A property, what cannot be without it, and what cannot be without that.
     const ROUNDS: usize = 4;
-    report.leaves_out(true);
+    report.leave_out(true);
     schema::check(root, report);
-    report.leaves_out(false);
+    report.leave_out(false);
+    let mut places = report.take_left_out();
     for _ in 0..ROUNDS {
-        let broken = report.take_broken();
-        if broken.is_empty() {
+        if places.is_empty() || report.refuses() {
             return;
         }
-        broken.iter().for_each(|place| take_out(root, place));
+        places.iter().for_each(|place| take_out(root, place));
         // Only what now lacks something is new.
         let mut again = Report::new(report.file());
-        again.leaves_out(true);
+        again.leave_out(true);
         schema::check(root, &mut again);
-        report.break_more(again.take_broken());
+        places = again.take_left_out();
+        report.take_faults(again);
     }
     // What is still broken is beyond mending: it is refused.
-    if !report.take_broken().is_empty() {
+    if !places.is_empty() {
         schema::check(root, report);
     }
 }

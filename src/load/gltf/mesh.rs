@@ -104,7 +104,7 @@ struct Task<'a, 'b> {
     reader: Reader<'a>,
     job: &'b Job<'b>,
     report: &'b mut Report,
-    /// How many there are.
+    /// How many vertices there are to name.
     vertices: u64,
     /// The vertices that the indices name, when these are not all.
     used: Option<Vec<u32>>,
@@ -150,6 +150,11 @@ impl Task<'_, '_> {
         (is_readable(&semantic, format) && self.reader.count(index) == self.vertices).then_some(index)
     }
 
+    /// The number of the accessor of the indices; of no accessor, where there are none.
+    fn indices(&self) -> usize {
+        self.job.primitive.indices.map_or(usize::MAX, |index| index.value())
+    }
+
     fn place(&self, part: &str) -> String {
         format!("{}.{part}", self.job.place)
     }
@@ -191,10 +196,10 @@ impl Task<'_, '_> {
             _ => u32::MAX,
         };
         let vertices = self.vertices;
-        let place = self.place("indices");
         let Some(at) = corners.iter().position(|&c| u64::from(c) >= vertices) else {
             let is_decoded = self.reader.decoded.indices(index.value()).is_some();
             if u64::from(restart) < vertices && !is_decoded && corners.contains(&restart) {
+                let place = self.place("indices");
                 let text = format!("index {restart} asks for a restart elsewhere; here it is a vertex");
                 self.report.warn(Code::AccessorIndexPrimitiveRestart, place, text);
             }
@@ -208,6 +213,7 @@ impl Task<'_, '_> {
             let text = format!("index {} at position {at}, but only {vertices} vertices exist", corners[at]);
             (Code::AccessorIndexOob, text)
         };
+        let place = self.place("indices");
         self.report.add(code, place, text);
         None
     }
@@ -295,6 +301,16 @@ impl Task<'_, '_> {
             };
             let Some(index) = index.filter(readable) else { continue };
             let part = format!("targets[{k}].{name}");
+            let (has, vertices) = (self.reader.count(index), self.vertices);
+            if has != vertices {
+                // Of others it was told when the JSON was checked.
+                if self.reader.decoded.indices(self.indices()).is_some() {
+                    let place = self.place(&part);
+                    let text = format!("{has} elements for {vertices} vertices");
+                    self.report.add(Code::MeshPrimitiveMorphTargetInvalidAttributeCount, place, text);
+                }
+                continue;
+            }
             let Some(deltas) = self.floats::<3>(index, &part).filter(|d| d.len() == count) else { continue };
             let deltas = deltas.into_iter().map(|d| Vec3::from(d) * weight);
             match name {

@@ -80,6 +80,7 @@ use report::Report;
 use scene::{Placed, Played};
 use skin::Skin;
 use sparse::Replacements;
+use std::borrow::Cow;
 use weight::Weight;
 
 /// Loads a glTF 2.0 file; whatever that takes comes out of `budget`.
@@ -107,11 +108,15 @@ impl Loading<'_> {
         let file = &self.source.path;
         let container = container::split(&self.source.bytes, self.report);
         let container = self.passed(container)?;
-        let weight = Weight::of(container.json);
+        let json = document::text(container.json, self.report);
+        if let Cow::Owned(text) = &json {
+            self.take(budget, text.len() as u64, "the JSON, once it is UTF-8,")?;
+        }
+        let weight = Weight::of(json.as_bytes());
         document::check_depth(&weight, self.report);
         self.report.check()?;
         self.take(budget, weight.bytes(), "the JSON, once it is parsed,")?;
-        let value = document::parse(container.json, self.report);
+        let value = document::parse(&json, self.report);
         let mut value = self.passed(value)?;
         mend::take_out_blanks(&mut value, self.report);
         mend::lengthen_buffer(&mut value, container.bin, self.report);

@@ -18,13 +18,13 @@ pub(super) struct Report {
     pub(super) warnings: Warnings,
     /// Whether parts that can be left out are, where they would refuse the file; and the places of those that are.
     leaves_out: bool,
-    broken: Vec<String>,
+    left_out: Vec<String>,
 }
 
 impl Report {
     pub(super) fn new(file: &Path) -> Self {
         let (faults, warnings) = (Warnings::default(), Warnings::default());
-        Self { file: file.into(), faults, warnings, leaves_out: false, broken: Vec::new() }
+        Self { file: file.into(), faults, warnings, leaves_out: false, left_out: Vec::new() }
     }
 
     pub(super) fn file(&self) -> &Path {
@@ -32,18 +32,23 @@ impl Report {
     }
 
     /// Whether from now on faults in parts that can be left out are warnings, and their places are kept.
-    pub(super) fn leaves_out(&mut self, leaves_out: bool) {
-        self.leaves_out = leaves_out;
+    pub(super) fn leave_out(&mut self, whether: bool) {
+        self.leaves_out = whether;
     }
 
     /// The places that were kept, in the order of their faults.
-    pub(super) fn take_broken(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.broken)
+    pub(super) fn take_left_out(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.left_out)
     }
 
-    /// Keeps more of them.
-    pub(super) fn break_more(&mut self, places: Vec<String>) {
-        self.broken.extend(places);
+    /// Whether anything refuses the file.
+    pub(super) fn refuses(&self) -> bool {
+        !self.faults.is_empty()
+    }
+
+    /// Takes over what refuses the file by another report, but none of its warnings.
+    pub(super) fn take_faults(&mut self, other: Self) {
+        self.faults.extend(other.faults);
     }
 
     /// Files a fault under its code's verdict at `place`.
@@ -57,8 +62,8 @@ impl Report {
 
     /// Files a fault that refuses the file whatever the table says of the milder cases of its code.
     pub(super) fn refuse(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>) {
-        if self.leaves_out && codes::can_be_left_out(place.as_ref()) && self.broken.len() < LEFT_OUT {
-            self.broken.push(place.as_ref().to_owned());
+        if self.leaves_out && codes::can_be_left_out(place.as_ref()) && self.left_out.len() < LEFT_OUT {
+            self.left_out.push(place.as_ref().to_owned());
             return self.warn_with(code, place, text, "it is left out");
         }
         let fault = Diagnostic::new(code.name(), &self.file, place.as_ref(), text);

@@ -98,6 +98,11 @@ pub(super) fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
     value.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
+/// Whether it is known what an extension holds.
+pub(super) fn is_known_extension(name: &str) -> bool {
+    EXTENSIONS.iter().any(|extension| extension.name == name)
+}
+
 /// Checks the whole document.
 pub(super) fn check(root: &Value, report: &mut Report) {
     let used = strings(root.get("extensionsUsed"));

@@ -71,15 +71,13 @@ impl Finder<'_> {
         let last = Path::new(name).file_name()?;
         let shortened = without_first_folders(name);
         let resolver = &mut *self.resolver;
+        let in_folders = |name: &Path| folders.iter().map(|folder| folder.join(name)).collect::<Vec<_>>();
+        let in_any_case = in_folders(Path::new(name)).iter().find_map(|path| resolver.in_any_case(path));
         let as_written =
-            |name: &PathBuf| folders.iter().map(|folder| folder.join(name)).find(|path| resolver.locate(path).is_ok());
-        let found = shortened.iter().find_map(as_written);
-        let path = found.or_else(|| {
-            let names =
-                std::iter::once(PathBuf::from(name)).chain(shortened).chain(moved_or_converted(Path::new(last)));
-            names
-                .into_iter()
-                .find_map(|name| folders.iter().find_map(|folder| resolver.in_any_case(&folder.join(&name))))
+            || shortened.iter().flat_map(|name| in_folders(name)).find(|path| resolver.locate(path).is_ok());
+        let path = in_any_case.or_else(as_written).or_else(|| {
+            let names = shortened.iter().cloned().chain(moved_or_converted(Path::new(last)));
+            names.flat_map(|name| in_folders(&name)).find_map(|path| resolver.in_any_case(&path))
         })?;
         let canonical = self.resolver.locate(&path).ok()?;
         Some(Place { path, canonical, guessed: true })
@@ -283,6 +281,7 @@ mod tests {
             assert_eq!(read(name), Ok(("textures/wood.png".into(), true)), "{name}");
         }
         assert_eq!(read("D:/work/house/maps/door.jpg"), Ok(("house/maps/door.jpg".into(), true)));
+        assert_eq!(read("House/maps/door.jpg"), Ok(("house/maps/door.jpg".into(), true)));
         assert_eq!(read("wood.mtl"), Err("'wood.mtl' is not there".into()));
         assert_eq!(read("other.png"), Err("'other.png' is not there".into()));
     }

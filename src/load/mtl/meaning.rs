@@ -409,9 +409,9 @@ fn is_of_glass(illum: i32) -> bool {
 
 /// Whether a colour, of what sends back no more light than falls on it, is one of 0…255.
 fn are_bytes(color: [f64; 3]) -> bool {
-    /// More than any slip.
-    const LEAST: f64 = 2.0;
-    color.iter().any(|&x| x > LEAST) && color.iter().all(|x| (0.0..=255.0).contains(x))
+    /// More than anybody means who means more than all light.
+    const LEAST: f64 = 16.0;
+    color.iter().any(|&x| x >= LEAST) && color.iter().all(|x| (0.0..=255.0).contains(x) && x.fract() == 0.0)
 }
 
 fn words_of(color: [f64; 3]) -> String {
@@ -575,6 +575,7 @@ mod tests {
         // Colours stay as they are: light may be brighter than white.
         let (m, warnings) = guess("Kd 1.5 1 0\nKe 4 4 4");
         assert_eq!((m.base_color, warnings), (Vec3::new(1.5, 1.0, 0.0), vec!["mtl-range"]));
+        assert_eq!(guess("Kd 2.5 2.5 2.5").0.base_color, Vec3::splat(2.5));
         assert_eq!(literal("Kd 255 128 0").base_color, Vec3::new(255.0, 128.0, 0.0));
         let (m, warnings) = guess("Kd 255 128 0");
         assert_eq!(warnings, ["mtl-color-bytes"]);
@@ -614,6 +615,7 @@ mod tests {
 
         let (m, warnings) = guess_of("# VTK, the Visualization Toolkit", "Kd 1 0 0\nTr 0.2", &[]);
         assert_eq!((m.opacity, warnings), (0.2, vec!["mtl-tr-as-opacity"]));
+        assert_eq!(guess_of("# VTK, the Visualization Toolkit", "Kd 1 0 0\nTr 1", &[]).0.opacity, 1.0);
         // 3ds Max writes opacity as Tf, too.
         let (m, warnings) = guess("Kd .26 .26 .26\nNi 1.5\nd 0.1\nTr 0.9\nTf 0.1 0.1 0.1\nillum 2");
         assert_eq!((m.opacity, m.alpha_mode, warnings), (0.1, AlphaMode::Blend, vec!["mtl-filter-is-opacity"]));

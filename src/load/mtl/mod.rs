@@ -89,7 +89,10 @@ pub(super) fn load(libraries: &[(u32, String)], names: &[Option<&str>], reading:
     }
 
     // The materials themselves.
-    let invisible = |&(l, m): &(usize, usize)| read[l].materials[m].d == Some(0.0);
+    let invisible = |&(l, m): &(usize, usize)| {
+        let (mtl, is_opacity) = (&read[l].materials[m], read[l].writer == Writer::Vtk);
+        mtl.d.or(mtl.tr.filter(|_| is_opacity)) == Some(0.0)
+    };
     let all_invisible = !used.is_empty() && used.iter().all(invisible) && found.iter().all(Option::is_some);
     let mut out = Materials::default();
     let mut made: HashMap<(usize, usize), u32> = HashMap::new();
@@ -154,9 +157,10 @@ fn read_library(found: Found, line: u32, names: &str, reading: &mut Reading) -> 
     if reading.options.mtl != MtlMode::Literal {
         if writer != Writer::Blender && writer::are_codes(&materials) {
             for mtl in &mut materials {
-                (mtl.kd, mtl.ke) = (mtl.kd.map(writer::light), mtl.ke.map(writer::light));
+                mtl.kd = mtl.kd.map(writer::light);
+                mtl.ke = mtl.ke.map(|ke| if writer::is_code(ke) { writer::light(ke) } else { ke });
             }
-            let text = "Kd and Ke are numbers of eight bits, and read as screens show them (sRGB)";
+            let text = "Kd is made of numbers of eight bits, and read as screens show it (sRGB), as is such a Ke";
             let warning = Diagnostic::new("mtl-coded-colors", &file, "", text);
             reading.warnings.push(warning.remedy("--mtl literal takes them for linear light"));
         }

@@ -209,7 +209,13 @@ impl Mapper<'_> {
         self.relief(material);
         let packed = self.whole(Slot::OcclusionRoughMetal);
         let rough_metal = packed.or_else(|| self.rough_metal());
-        let occlusion = packed.or_else(|| self.occlusion());
+        let is_physical = matches!(material.reflection, Reflection::MetalRough(_));
+        let occlusion = if is_physical { self.occlusion().or(packed) } else { None };
+        if let Some(map) = self.mtl.map(Slot::Occlusion).filter(|_| !is_physical) {
+            let text = "a map of occlusion (map_ao) is drawn on physically based materials only";
+            let warning = Diagnostic::new("mtl-unsupported", self.library.file, map.line.to_string(), text);
+            self.warnings.push(warning.remedy("give it a roughness (Pr)"));
+        }
         self.tell_of_ambient_map();
         let ambient = if self.mode == MtlMode::Literal { self.whole(Slot::Ambient) } else { material.base_color_map };
         let base_is_black = material.base_color == crate::math::Vec3::ZERO;

@@ -24,8 +24,8 @@ pub(super) enum Writer {
 
 /// What comments of each say, in lower case.
 const NAMES: [(&str, Writer); 5] = [
-    ("blender", Writer::Blender),
-    ("3ds max", Writer::Max),
+    ("# blender ", Writer::Blender),
+    ("# 3ds max ", Writer::Max),
     ("guruware", Writer::Max),
     ("alicevision", Writer::Meshroom),
     ("visualization toolkit", Writer::Vtk),
@@ -65,16 +65,25 @@ pub(super) fn are_codes(materials: &[Mtl]) -> bool {
     chance.is_some_and(|chance| chance < CHANCE)
 }
 
-/// How likely it is that a number with so many digits is one of eight bits by chance; `None` where it is none.
+/// How likely it is that a number with so many digits is one of eight bits by chance; `None` where it is none. What is next to
+/// 0 or 1, or a third, is what people write.
 fn chance_of_code(number: f64) -> Option<f64> {
     const CODES: f64 = 255.0;
+    /// Of eight bits.
+    const COMMON: [f64; 4] = [0.0, 85.0, 170.0, 255.0];
     // Zeros at the end were not kept, so that some numbers seem to have a digit less, and say less.
     let written = number.to_string();
     let digits = written.split_once('.').map_or(0, |(_, places)| places.len());
     let half = 0.5 * libm::exp10(-(digits as f64));
-    let off = (number - (number * CODES).round() / CODES).abs();
+    let code = (number * CODES).round();
     // Some cut the digits that they do not write.
-    ((0.0..=1.0).contains(&number) && off <= 2.0 * half).then_some((4.0 * half * CODES).min(1.0))
+    let is_code = (0.0..=1.0).contains(&number) && (number - code / CODES).abs() <= 2.0 * half;
+    is_code.then_some(if COMMON.contains(&code) { 1.0 } else { (4.0 * half * CODES).min(1.0) })
+}
+
+/// Whether each part of a colour is one of eight bits.
+pub(super) fn is_code(color: [f64; 3]) -> bool {
+    color.into_iter().all(|part| chance_of_code(part).is_some())
 }
 
 /// The light of a colour of screens, each part 0…1.
@@ -94,7 +103,8 @@ mod tests {
         assert_eq!(of("# Blender 4.2.1 MTL File: 'None'\n# www.blender.org\n"), Writer::Blender);
         assert_eq!(of("#\n# 3ds Max Wavefront OBJ Exporter v0.97b\n"), Writer::Max);
         assert_eq!(of("\r\n# wavefront mtl file written by the visualization toolkit\r\n"), Writer::Vtk);
-        assert_eq!(of("newmtl a\n# Blender\n"), Writer::Other);
+        assert_eq!(of("newmtl a\n# Blender MTL File\n"), Writer::Other);
+        assert_eq!(of("# made for Blender and 3ds Max\n"), Writer::Other);
         assert_eq!(of(""), Writer::Other);
     }
 
@@ -114,5 +124,6 @@ mod tests {
         assert!(!are(&[[0.8, 0.026241, 0.115]]));
         assert!(!are(&[[0.1098, 0.3490, 0.6941], [0.3452, 0.1, 0.1]]));
         assert!(!are(&[[0.0, 1.0, 0.0]]) && !are(&[]));
+        assert!(!are(&[[0.333333, 0.666667, 0.8], [1e-6, 0.9999, 1e-300]]));
     }
 }

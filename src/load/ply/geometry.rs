@@ -200,15 +200,17 @@ impl Reader<'_, '_> {
         const WIDER: f32 = 257.0;
         /// Less may be noise in the dark.
         const LEAST: f32 = 8.0 / 255.0 / WIDER;
+        /// Above 255 of 65535 by half a step, for what rounding may do.
+        const BYTE: f32 = 255.5 / 65535.0;
         let of_slot = |slot: usize| element.properties.iter().zip(slots).find(|(_, s)| **s == Some(slot));
         let is_wide = |slot: usize| of_slot(slot).is_some_and(|(property, _)| property.kind == Kind::U16);
         let greatest = self.bare.colors.iter().flat_map(|color| &color[..3]).copied().fold(0.0, f32::max);
-        // Half a step, for what rounding may do.
-        let are_bytes = (LEAST..1.0 / WIDER + 0.5 / 65535.0).contains(&greatest);
+        let are_bytes = (LEAST..BYTE).contains(&greatest);
         if !are_bytes || !COLOR.into_iter().all(is_wide) {
             return;
         }
-        let parts = if is_wide(ALPHA) { 4 } else { 3 };
+        let most_opaque = self.bare.colors.iter().map(|color| color[3]).fold(0.0, f32::max);
+        let parts = if is_wide(ALPHA) && most_opaque < BYTE { 4 } else { 3 };
         self.bare.colors.iter_mut().flat_map(|color| &mut color[..parts]).for_each(|part| *part *= WIDER);
         let text = "colours of 16 bits, all of them below 256, are taken as 0 … 255";
         self.bare.told.push(Diagnostic::new("color-bytes", &self.source.path, "", text));

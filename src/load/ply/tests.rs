@@ -419,6 +419,12 @@ fn float_colours_above_one_are_bytes() {
     let [first, second, _] = loaded.scene.meshes[0].colors[..] else { panic!("three corners") };
     assert!((first - Vec4::new(1.0, 0.0, 0.0, 1.0)).abs().max_element() < 1e-6, "{first}");
     assert!(second.y > 0.02 && loaded.warnings[0].code == "color-bytes", "{second}");
+    let with_alpha = format!("{wide}property ushort alpha\n");
+    for (alpha, opacity) in [("255", 1.0), ("32768", 0.5), ("65535", 1.0)] {
+        let rows = ["255 0 0", "0 51 0", "0 0 0"].map(|light| format!("{light} {alpha}"));
+        let loaded = triangle(&with_alpha, "", "", [&*rows[0], &*rows[1], &*rows[2]], "");
+        assert!((loaded.scene.meshes[0].colors[0].w - opacity).abs() < 1e-4, "{alpha}");
+    }
     let loaded = triangle(&wide, "", "", ["65535 0 0", "0 255 0", "0 0 0"], "");
     assert!(loaded.scene.meshes[0].colors[1].y < 0.001 && loaded.warnings.is_empty());
     let beyond = triangle(colors, "", "", ["1.5 0 0", "0 -1 0", "0 0 nan"], "");

@@ -40,8 +40,10 @@ pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnost
         } else if ends_solid(word) || (is(word, "end") && words.expect("solid").is_ok()) {
             open = false;
             words.pass_name();
-        } else if word.starts_with(b"#") || is_color(word) {
+        } else if word.starts_with(b"#") {
             words.words.rest_of_line();
+        } else if is_color(word) {
+            words.pass_numbers();
         } else {
             return Err(words.fault(word, "`solid`, `facet` or `endsolid`"));
         }
@@ -67,7 +69,6 @@ fn facet(words: &mut Words) -> Result<[DVec3; 3], Diagnostic> {
     for _ in 0..3 {
         words.next();
     }
-    words.pass_color();
     words.expect("outer")?;
     words.expect("loop")?;
     let mut corners = [DVec3::ZERO; 3];
@@ -145,6 +146,7 @@ impl<'a> Words<'a> {
     }
 
     fn expect(&mut self, keyword: &str) -> Result<(), Diagnostic> {
+        self.pass_color();
         let word = self.next().unwrap_or_default();
         if is(word, keyword) { Ok(()) } else { Err(self.fault(word, &format!("`{keyword}`"))) }
     }
@@ -157,16 +159,27 @@ impl<'a> Words<'a> {
         word
     }
 
-    /// Passes over a colour, to the end of its line.
+    /// Passes over the parts of a colour.
+    fn pass_numbers(&mut self) {
+        let is_number = |word: &[u8]| word.first().is_some_and(|b| b.is_ascii_digit() || b"+-.".contains(b));
+        for _ in 0..4 {
+            if is_number(self.peek()) {
+                self.next();
+            }
+        }
+    }
+
+    /// Passes over a colour, if one stands next.
     fn pass_color(&mut self) {
         if is_color(self.peek()) {
-            self.words.find();
-            self.words.rest_of_line();
+            self.next();
+            self.pass_numbers();
         }
     }
 
     /// A keyword that begins with `end`, in one word or two.
     fn end(&mut self, keyword: &str) -> Result<(), Diagnostic> {
+        self.pass_color();
         match keyword.strip_prefix("end").filter(|_| is(self.peek(), "end")) {
             Some(rest) => {
                 self.next();
@@ -176,19 +189,15 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// `endfacet`, and what some programs write behind it on its line, the three parts of a colour; others write nothing at all.
+    /// `endfacet`, and what some programs write behind it, the parts of a colour; others write nothing at all.
     fn end_of_facet(&mut self) -> Result<(), Diagnostic> {
+        self.pass_color();
         let next = self.peek();
-        if is(next, "facet") || ends_solid(next) {
+        if next.is_empty() || is(next, "facet") || ends_solid(next) {
             return Ok(());
         }
         self.end("endfacet")?;
-        for _ in 0..3 {
-            let at = self.words.at;
-            if self.words.next_in_line().is_some_and(|word| word.first().is_some_and(u8::is_ascii_alphabetic)) {
-                self.words.at = at;
-            }
-        }
+        self.pass_numbers();
         Ok(())
     }
 

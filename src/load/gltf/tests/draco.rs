@@ -170,6 +170,22 @@ fn streams_are_drawn_whole_whatever_numbers_their_accessors_declare() {
             assert!(loaded.warnings.iter().any(|w| w.text.contains(&said)), "{:?}", loaded.warnings);
         }
     }
+    // One accessor alone, and a morph target of as many values as are declared.
+    let mut unequal = file(&stream(WALK));
+    unequal.root["accessors"][2]["count"] = json!(23);
+    let loaded = unequal.load();
+    assert_eq!((triangles(&loaded), codes(&loaded)), (plain.clone(), vec!["gltf-draco-count"]));
+    let mut morphed = file(&stream(WALK));
+    let offsets = morphed.floats("VEC3", [1.0, 0.0, 0.0].repeat(23).as_slice());
+    morphed.root["accessors"].as_array_mut().unwrap()[1..=ATTRIBUTES.len()]
+        .iter_mut()
+        .for_each(|a| a["count"] = json!(23));
+    morphed.root["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": offsets }]);
+    morphed.root["meshes"][0]["weights"] = json!([0.5]);
+    let loaded = morphed.load();
+    assert_eq!(triangles(&loaded), plain);
+    let told = loaded.warnings.iter().find(|w| w.code.ends_with("morph-target-invalid-attribute-count")).unwrap();
+    assert_eq!(told.text, "23 elements for 24 vertices");
     // More vertices than two bytes can number are no matter: they are not kept so.
     let mut file = file(&stream(WALK));
     file.root["accessors"][0]["componentType"] = json!(5121);

@@ -120,6 +120,16 @@ fn what_is_wrong_in_a_material_is_left_out_and_the_rest_of_it_drawn() {
 }
 
 #[test]
+fn what_cannot_be_without_what_is_left_out_refuses_the_file() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    file.primitive(json!({"attributes": {"POSITION": positions}}));
+    file.set("extensionsUsed", json!(["KHR_materials_variants"]));
+    file.set("extensions", json!({"KHR_materials_variants": {"variants": [{"name": 5}]}}));
+    assert!(file.fault().contains("'name' is missing"), "{}", file.fault());
+}
+
+#[test]
 fn what_says_that_nothing_is_given_counts_as_not_given() {
     let mut file = Builder::new();
     let positions = file.triangle();
@@ -131,6 +141,13 @@ fn what_says_that_nothing_is_given_counts_as_not_given() {
     assert_eq!((loaded.facts.faces, codes(&loaded)), (1, vec!["gltf-blank"]));
     let told = loaded.warnings.iter().find(|w| w.code == "gltf-blank").unwrap();
     assert_eq!(told.text, "null, or -1 as an index, counts as not given (8 times)");
+    // What may be anything may be this.
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    file.primitive(json!({"attributes": {"POSITION": positions}}));
+    file.root["asset"]["extras"] = json!({"source": -1, "light": null});
+    file.set("extensionsUsed", json!(["VRM"])).set("extensions", json!({"VRM": {"mesh": -1, "meta": null}}));
+    assert!(codes(&file.load()).is_empty(), "{:?}", file.load().warnings);
     // What must be there is missing all the same.
     let mut file = Builder::new();
     let positions = file.triangle();
@@ -219,6 +236,7 @@ fn pictures_are_looked_for_beside_the_model_whatever_machine_they_were_on() {
         ("tex%20a.tga", true),
         ("https://example.org/textures/tex%20a.png", false),
         ("other.png", false),
+        ("../o/tex%20a.png", true),
     ] {
         let mut file = Builder::new();
         let positions = file.triangle();
@@ -231,6 +249,8 @@ fn pictures_are_looked_for_beside_the_model_whatever_machine_they_were_on() {
         assert_eq!(loaded.scene.materials[0].base_color_map.is_some(), found, "{uri}: {:?}", loaded.warnings);
         let is_told = loaded.warnings.iter().any(|w| w.code == "file-elsewhere");
         assert_eq!(is_told, found && uri != "textures/tex%20a.png", "{uri}: {:?}", loaded.warnings);
+        let is_outside = loaded.warnings.iter().any(|w| w.remedy.contains("--root"));
+        assert_eq!(is_outside, uri.starts_with("../"), "{uri}: {:?}", loaded.warnings);
     }
 }
 
