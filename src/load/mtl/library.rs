@@ -280,7 +280,7 @@ mod tests {
         ] {
             assert_eq!(read(name), Ok(("textures/wood.png".into(), true)), "{name}");
         }
-        assert_eq!(read("D:/work/house/maps/door.jpg"), Ok(("house/maps/door.jpg".into(), true)));
+        assert_eq!(read("D:/jobs/house/maps/door.jpg"), Ok(("house/maps/door.jpg".into(), true)));
         assert_eq!(read("House/maps/door.jpg"), Ok(("house/maps/door.jpg".into(), true)));
         assert_eq!(read("wood.mtl"), Err("'wood.mtl' is not there".into()));
         assert_eq!(read("other.png"), Err("'other.png' is not there".into()));
