@@ -5,8 +5,8 @@
 //! can be left out; **accept** in silence what changes nothing. Faults in animations are at most warned about, because
 //! nodes that they do not move can be drawn at rest, and so are those in images, because a material can be drawn without a
 //! map, in cameras, because there is always another view, and in the bounds that accessors declare, because nothing is
-//! drawn from them ([`Code::verdict_at`]). Of materials, textures, samplers and lights what breaks the schema is left out
-//! (`mend`).
+//! drawn from them ([`Code::verdict_at`]). Of materials, textures, samplers and lights, and of names, what breaks the schema
+//! is left out (`mend`).
 
 use std::sync::LazyLock;
 

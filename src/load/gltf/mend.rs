@@ -2,8 +2,8 @@
 //!
 //! What programs write for "not given", `null` and an index of −1, goes before anything looks at it. Then the schema is
 //! checked: a property of a material, a texture, a sampler or a light that breaks it goes, and with it whatever cannot be
-//! without it (a reference to a texture without its index); so does a name that is none. Of what holds the shape of a model
-//! together, only the length of a buffer is mended, where its bytes are there.
+//! without it (a reference to a texture without its index); so does a name that is none. Nothing else of what holds the shape
+//! of a model together is mended but the length of a buffer, where its bytes are there.
 
 use super::codes::Code;
 use super::report::Report;

@@ -128,7 +128,7 @@ impl Finder<'_> {
 /// Folders that pictures are put in when a model is shipped.
 const FOLDERS: [&str; 5] = ["textures", "texture", "maps", "images", "tex"];
 
-/// Kinds of pictures that can be read, and those that are shipped as one of them instead.
+/// Kinds of pictures that others are converted to before they are shipped, and these others.
 const KINDS: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
 const CONVERTED: [&str; 9] = ["tif", "tiff", "tga", "bmp", "gif", "psd", "dds", "exr", "hdr"];
 
