@@ -7,6 +7,7 @@ use crate::math::simd::{LANES, Row};
 use crate::math::triangles::{Corners8, NO_CORNERS};
 use crate::pages::Paged;
 use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
 
 /// Eight children: their boxes and what they are.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -171,14 +172,25 @@ pub(super) struct Tree<'a> {
 }
 
 impl Arrays {
-    /// These nodes, of which the first is the root, in these bounds, and room for so many blocks.
-    pub(super) fn new(nodes: &[Node], blocks: usize, bounds: Aabb) -> Self {
-        let of_nodes = OF_NODE * nodes.len();
-        let mut lines = Paged::zeroed(of_nodes + OF_BLOCK * blocks);
-        lines[..of_nodes].copy_from_slice(bytemuck::cast_slice(nodes));
+    /// The nodes of these pieces, one behind the other, of which the first is the root, in these bounds, and room for so many
+    /// blocks. Nodes are numbered within their piece; `depth` are on the longest way down.
+    pub(super) fn new(pieces: &[Vec<Node>], depth: u32, blocks: usize, bounds: Aabb) -> Self {
+        let nodes = pieces.iter().map(Vec::len).sum();
+        let mut lines = Paged::zeroed(OF_NODE * nodes + OF_BLOCK * blocks);
+        let mut rest: &mut [Node] = bytemuck::cast_slice_mut(&mut lines[..OF_NODE * nodes]);
+        let mut start = 0;
+        let mut places = Vec::new();
+        for piece in pieces {
+            places.push((piece, start, rest.split_off_mut(..piece.len()).unwrap_or_default()));
+            start += index(piece.len());
+        }
+        places.into_par_iter().for_each(|(piece, start, place)| {
+            for (node, place) in piece.iter().zip(place) {
+                *place = Node { children: node.children.map(|child| Child::behind(child, start)), ..*node };
+            }
+        });
         let extent = bounds.lo.abs().max(bounds.hi.abs()).max_element();
-        let depth = if nodes.is_empty() { 0 } else { depth_below(nodes, 0) };
-        Self { lines, nodes: nodes.len(), runs: Vec::new(), prims: Vec::new(), bounds, extent, depth }
+        Self { lines, nodes, runs: Vec::new(), prims: Vec::new(), bounds, extent, depth }
     }
 
     /// With runs of these prims.
@@ -196,22 +208,6 @@ impl Arrays {
         let (nodes, blocks) = (bytemuck::cast_slice(nodes), bytemuck::cast_slice(blocks));
         Tree { nodes, blocks, runs, prims, bounds: *bounds, extent: *extent, depth: *depth }
     }
-}
-
-fn depth_below(nodes: &[Node], node: u32) -> u32 {
-    let below = |&child: &u32| match Child::unpack(child) {
-        Child::Node(i) => depth_below(nodes, i),
-        _ => 0,
-    };
-    1 + nodes[node as usize].children.iter().map(below).max().unwrap_or(0)
-}
-
-/// Adds the nodes of a subtree; its root is the child that is returned.
-pub(super) fn append(nodes: &mut Vec<Node>, subtree: Vec<Node>) -> Child {
-    let before = index(nodes.len());
-    let moved = |node: Node| Node { children: node.children.map(|child| Child::behind(child, before)), ..node };
-    nodes.extend(subtree.into_iter().map(moved));
-    Child::Node(before)
 }
 
 impl<'a> Tree<'a> {

@@ -13,12 +13,15 @@ use rayon::prelude::*;
 
 use super::grow::Knot;
 use super::slots::slots;
-use crate::accel::wide::node::{Child, Node, append, index};
+use crate::accel::wide::node::{Arrays, Child, Node, index};
 use crate::math::aabb::Aabb;
 use crate::math::simd::LANES;
 
 /// Knots that are worth a thread's while.
 const PARALLEL: usize = 512;
+
+/// Of so many parts of a tree one is worth a piece. The same for every number of threads: so is the order of nodes.
+const PARTS: usize = 64;
 
 /// How many rays start or end at a shape where one comes from afar.
 const NEAR: f32 = 0.15;
@@ -82,14 +85,58 @@ fn plan(knots: &[Knot], near: f32, plans: &mut [Plan]) {
     plans[0] = Plan::of(root, near, [&plans[1], &plans[second]]);
 }
 
-/// The nodes over a binary tree whose leaves are packed children.
-pub(super) fn nodes(knots: &[Knot]) -> Vec<Node> {
-    let mut plans = bytemuck::zeroed_vec(knots.len());
-    let near = knots.first().map_or(0.0, Knot::area) * NEAR / knots.len() as f32;
-    plan(knots, near, &mut plans);
-    let mut nodes = Vec::new();
-    Collapse { knots, plans: &plans }.node(0..knots.len(), &mut nodes);
-    nodes
+/// The nodes of a tree, in pieces that threads made. The first is the root.
+#[derive(Default)]
+pub(super) struct Nodes {
+    /// The nodes above all subtrees, which have their places in the whole as children, then subtrees, of which each has its
+    /// own nodes as children.
+    pieces: Vec<Vec<Node>>,
+    /// Nodes on the longest way down.
+    depth: u32,
+}
+
+impl Nodes {
+    /// The nodes over a binary tree whose leaves are packed children.
+    pub(super) fn over(knots: &[Knot]) -> Self {
+        let mut plans = bytemuck::zeroed_vec(knots.len());
+        let near = knots.first().map_or(0.0, Knot::area) * NEAR / knots.len() as f32;
+        plan(knots, near, &mut plans);
+        let collapse = Collapse { knots, plans: &plans };
+
+        let (mut top, mut subtrees) = (Vec::new(), Vec::new());
+        let largest = PARALLEL.max(knots.len() / PARTS);
+        collapse.top(0..knots.len(), 0, largest, &mut top, &mut subtrees);
+        let built = subtrees.par_iter().map(|subtree: &Subtree| {
+            let mut nodes = Vec::new();
+            let depth = collapse.node(subtree.knots.clone(), &mut nodes);
+            (nodes, subtree.above + depth)
+        });
+        let built: Vec<(Vec<Node>, u32)> = built.collect();
+        let mut start = top.len();
+        for (subtree, (nodes, _)) in subtrees.iter().zip(&built) {
+            let Subtree { parent, slot, .. } = *subtree;
+            top[parent].children[slot] = Child::Node(index(start)).pack();
+            start += nodes.len();
+        }
+        let depth = built.iter().map(|(_, depth)| *depth).max().unwrap_or(1);
+        let pieces = [top].into_iter().chain(built.into_iter().map(|(nodes, _)| nodes)).collect();
+        Self { pieces, depth }
+    }
+
+    /// These nodes, in these bounds, and room for so many blocks.
+    pub(super) fn into_arrays(self, blocks: usize, bounds: Aabb) -> Arrays {
+        Arrays::new(&self.pieces, self.depth, blocks, bounds)
+    }
+}
+
+/// A part of a tree that is built as a piece of its own.
+struct Subtree {
+    knots: Range<usize>,
+    /// The node among those at the top, and its slot, which lead there.
+    parent: usize,
+    slot: usize,
+    /// Nodes above it.
+    above: u32,
 }
 
 struct Collapse<'k> {
@@ -104,42 +151,60 @@ struct Children {
     len: usize,
 }
 
+impl Children {
+    fn iter(&self) -> impl Iterator<Item = &Range<usize>> {
+        self.below[..self.len].iter()
+    }
+}
+
 impl Collapse<'_> {
-    /// Adds the node of a knot, the first of these, and all below; its index.
+    /// Adds the node of a knot, the first of these, below so many nodes, and those below it that stand for more than `largest`
+    /// knots; lists the others.
+    fn top(&self, knots: Range<usize>, above: u32, largest: usize, nodes: &mut Vec<Node>, subtrees: &mut Vec<Subtree>) {
+        let (children, slots, parent) = self.open(knots, nodes);
+        for (below, slot) in children.iter().zip(slots) {
+            if self.knots[below.start].is_leaf() {
+                continue;
+            }
+            if below.len() > largest {
+                nodes[parent].children[slot] = Child::Node(index(nodes.len())).pack();
+                self.top(below.clone(), above + 1, largest, nodes, subtrees);
+            } else {
+                subtrees.push(Subtree { knots: below.clone(), parent, slot, above: above + 1 });
+            }
+        }
+    }
+
+    /// Adds the node of a knot, the first of these, and all below; how many nodes are on the longest way down.
     fn node(&self, knots: Range<usize>, nodes: &mut Vec<Node>) -> u32 {
+        let (children, slots, at) = self.open(knots, nodes);
+        let mut deepest = 0;
+        for (below, slot) in children.iter().zip(slots) {
+            if !self.knots[below.start].is_leaf() {
+                nodes[at].children[slot] = Child::Node(index(nodes.len())).pack();
+                deepest = deepest.max(self.node(below.clone(), nodes));
+            }
+        }
+        1 + deepest
+    }
+
+    /// Adds a node whose children are chosen, but for those that will be nodes; these and their slots, and its own place.
+    fn open(&self, knots: Range<usize>, nodes: &mut Vec<Node>) -> (Children, [usize; LANES], usize) {
         let mut children = Children::default();
-        self.expand(knots.clone(), LANES, &mut children);
-        let children = &children.below[..children.len];
+        self.expand(knots, LANES, &mut children);
         let mut bounds = [Aabb::EMPTY; LANES];
-        for (bounds, child) in bounds.iter_mut().zip(children) {
+        for (bounds, child) in bounds.iter_mut().zip(children.iter()) {
             *bounds = self.knots[child.start].bounds();
         }
-        let at = nodes.len();
-        nodes.push(Node::EMPTY);
-
-        let is_node = |child: &Range<usize>| !self.knots[child.start].is_leaf();
-        let mut built: Vec<Option<Vec<Node>>> = if knots.len() > PARALLEL {
-            let subtree = |child: &Range<usize>| {
-                is_node(child).then(|| {
-                    let mut nodes = Vec::new();
-                    self.node(child.clone(), &mut nodes);
-                    nodes
-                })
-            };
-            children.par_iter().map(subtree).collect()
-        } else {
-            Vec::new()
-        };
-        let slots = slots(&bounds[..children.len()]);
-        for (i, below) in children.iter().enumerate() {
-            let child = match built.get_mut(i).and_then(Option::take) {
-                Some(subtree) => append(nodes, subtree),
-                None if is_node(below) => Child::Node(self.node(below.clone(), nodes)),
-                None => Child::unpack(self.knots[below.start].at),
-            };
-            nodes[at].set(slots[i], &bounds[i], child);
+        let slots = slots(&bounds[..children.len]);
+        let mut node = Node::EMPTY;
+        for ((child, bounds), slot) in children.iter().zip(&bounds).zip(slots) {
+            let knot = &self.knots[child.start];
+            let leaf = if knot.is_leaf() { Child::unpack(knot.at) } else { Child::unpack(Child::NOTHING) };
+            node.set(slot, bounds, leaf);
         }
-        index(at)
+        nodes.push(node);
+        (children, slots, nodes.len() - 1)
     }
 
     /// The knots that stand for a knot, the first of these, and all below, as so many children.
@@ -171,7 +236,8 @@ mod tests {
         packed.iter_mut().filter(|k| k.is_leaf()).for_each(|k| k.at = Child::Block(k.at, 1).pack());
         let children = |node: &Node| node.children.map(Child::unpack).into_iter().filter(|c| *c != Child::Block(0, 0));
         let is_node = |c: &Child| matches!(c, Child::Node(_));
-        nodes(&packed).iter().map(|n| (children(n).count(), children(n).filter(is_node).count())).collect()
+        let nodes = Nodes::over(&packed).pieces.concat();
+        nodes.iter().map(|n| (children(n).count(), children(n).filter(is_node).count())).collect()
     }
 
     fn small(i: u32) -> Vec<Knot> {

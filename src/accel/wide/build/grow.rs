@@ -4,13 +4,18 @@ use super::cell::{Cell, Count, Lattice};
 use crate::accel::wide::split::{Bounds, Cut, Item, Splitting, cut_by_area};
 use crate::math::Vec3;
 use crate::math::aabb::Aabb;
+use bytemuck::Zeroable;
+use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
 /// Fewer items are not worth a thread's while.
 const PARALLEL: usize = 1024;
 
-/// Parts for each thread. More of them would balance better, but what a second side makes is copied behind the first's.
+/// Parts for each thread.
 const PARTS: usize = 16;
+
+/// Pieces of no more knots are put together.
+const PIECE: usize = 256;
 
 /// Cells of few items are not cut at their planes but by area, which fills leaves better: of no more than this part of all
 /// items and no more than so many, but always of so few.
@@ -27,7 +32,7 @@ const WORTH_CUTTING: f32 = 0.8;
 const FLAT: f32 = 0.1;
 
 /// A node of the binary tree. They stand in an array, each followed by all that is below it, first side first.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Zeroable)]
 pub(super) struct Knot {
     pub lo: Vec3,
     /// Of a leaf the first of its prims, in the end the packed child that it is; of another knot how many knots further on
@@ -62,6 +67,97 @@ impl Knot {
     pub(super) fn area(&self) -> f32 {
         let d = self.hi - self.lo;
         d.x * d.y + d.y * d.z + d.z * d.x
+    }
+}
+
+/// A tree while it grows: its knots in their order, in pieces that are not moved until it is known how many there are.
+#[derive(Default)]
+pub(super) struct Growth {
+    pieces: Vec<Vec<Knot>>,
+    /// The last piece, which knots are added to.
+    open: Vec<Knot>,
+    /// Knots above the next one.
+    above: usize,
+    /// Knots on the longest way down.
+    depth: usize,
+}
+
+impl Growth {
+    /// Begins below so many knots.
+    fn below(above: usize) -> Self {
+        Self { above, ..Self::default() }
+    }
+
+    fn len(&self) -> usize {
+        self.pieces.iter().chain([&self.open]).map(Vec::len).sum()
+    }
+
+    /// Adds a knot over what `first` and `second` add.
+    fn fork(&mut self, bounds: Aabb, first: impl FnOnce(&mut Self), second: impl FnOnce(&mut Self)) {
+        let at = self.open.len();
+        self.add(Knot::fork(bounds, 0));
+        self.above += 1;
+        first(self);
+        self.open[at].at = index(self.open.len() - at);
+        second(self);
+        self.above -= 1;
+    }
+
+    /// The same by two threads.
+    pub(super) fn fork_shared(
+        &mut self,
+        bounds: Aabb,
+        first: impl FnOnce(&mut Self) + Send,
+        second: impl FnOnce(&mut Self) + Send,
+    ) {
+        let before = self.len();
+        self.add(Knot::fork(bounds, 0));
+        self.close();
+        let piece = self.pieces.len() - 1;
+        let at = self.pieces[piece].len() - 1;
+        self.above += 1;
+        let mut beyond = Self::below(self.above);
+        rayon::join(|| first(self), || second(&mut beyond));
+        self.above -= 1;
+        self.pieces[piece][at].at = index(self.len() - before);
+        self.close();
+        beyond.pieces.into_iter().for_each(|piece| self.put(piece));
+        self.open = beyond.open;
+        self.depth = self.depth.max(beyond.depth);
+    }
+
+    fn add(&mut self, knot: Knot) {
+        self.depth = self.depth.max(self.above + 1);
+        self.open.push(knot);
+    }
+
+    /// Ends the last piece.
+    fn close(&mut self) {
+        let piece = std::mem::take(&mut self.open);
+        self.put(piece);
+    }
+
+    /// Puts a piece behind the others.
+    fn put(&mut self, piece: Vec<Knot>) {
+        match self.pieces.last_mut() {
+            Some(last) if last.len() + piece.len() <= PIECE => last.extend(piece),
+            _ => self.pieces.push(piece),
+        }
+    }
+
+    /// All knots, and how many are on the longest way down.
+    pub(super) fn finish(mut self) -> (Vec<Knot>, usize) {
+        if self.pieces.is_empty() {
+            return (self.open, self.depth);
+        }
+        self.close();
+        // Each thread makes the pages that it writes to.
+        let mut knots = bytemuck::zeroed_vec(self.len());
+        let mut rest = &mut knots[..];
+        let places: Vec<&mut [Knot]> =
+            self.pieces.iter().map(|piece| rest.split_off_mut(..piece.len()).unwrap_or_default()).collect();
+        self.pieces.into_par_iter().zip(places).for_each(|(piece, place)| place.copy_from_slice(&piece));
+        (knots, self.depth)
     }
 }
 
@@ -125,28 +221,28 @@ impl Grower {
         Self { lattice: Lattice::over(&bounds.aabb()), small_cell, leaf, area: bounds.area(), parallel }
     }
 
-    /// Adds the tree over some items, at least one, to `knots`; the same for every number of threads. `middles` is the box
+    /// Adds the tree over some items, at least one, to `growth`; the same for every number of threads. `middles` is the box
     /// around their doubled middles, where known.
-    pub(super) fn grow(&self, work: Work, bounds: Bounds, middles: Option<Bounds>, knots: &mut Vec<Knot>) {
+    pub(super) fn grow(&self, work: Work, bounds: Bounds, middles: Option<Bounds>, growth: &mut Growth) {
         let count = work.prims.len();
         if count <= self.leaf as usize {
             if let Some(cut) = self.cut_large_leaf(work.items, &bounds) {
-                return self.fork(work, &cut, bounds, knots);
+                return self.fork(work, &cut, bounds, growth);
             }
             for (place, prim) in work.prims.iter_mut().zip(work.items.iter().flat_map(Item::prims)) {
                 *place = prim;
             }
             work.prims.sort_unstable();
-            return knots.push(Knot::leaf(bounds.aabb(), work.first, index(count)));
+            return growth.add(Knot::leaf(bounds.aabb(), work.first, index(count)));
         }
         if work.items.len() > self.small_cell
             && let Some(cell) = self.lattice.cell(work.items, self.leaf)
         {
             cell.sort(&self.lattice, work.items, work.spare);
-            return self.grow_cell(&cell, Cell::ALL, work.swapped(), bounds, knots);
+            return self.grow_cell(&cell, Cell::ALL, work.swapped(), bounds, growth);
         }
         let cut = cut_by_area(work.items, self.leaf, middles);
-        self.fork(work, &cut, bounds, knots);
+        self.fork(work, &cut, bounds, growth);
     }
 
     /// The cut of what fits into a leaf, where it is better than the leaf.
@@ -162,7 +258,7 @@ impl Grower {
     }
 
     /// Adds the knot of a cut, and all below.
-    fn fork(&self, work: Work, cut: &Cut, bounds: Bounds, knots: &mut Vec<Knot>) {
+    fn fork(&self, work: Work, cut: &Cut, bounds: Bounds, growth: &mut Growth) {
         let (count, [first, second]) = (work.items.len(), cut.bounds);
         let middles = |part: usize| cut.middles.map(|both| both[part]);
         let (first_middles, second_middles) = (middles(0), middles(1));
@@ -170,22 +266,22 @@ impl Grower {
         self.join(
             count,
             bounds,
-            knots,
-            |k| self.grow(a, first, first_middles, k),
-            |k| self.grow(b, second, second_middles, k),
+            growth,
+            |g| self.grow(a, first, first_middles, g),
+            |g| self.grow(b, second, second_middles, g),
         );
     }
 
     /// The same for some parts of a cell.
-    fn grow_cell(&self, cell: &Cell, parts: u8, work: Work, bounds: Bounds, knots: &mut Vec<Knot>) {
-        let Some(first) = cell.cut(parts) else { return self.grow(work, bounds, None, knots) };
+    fn grow_cell(&self, cell: &Cell, parts: u8, work: Work, bounds: Bounds, growth: &mut Growth) {
+        let Some(first) = cell.cut(parts) else { return self.grow(work, bounds, None, growth) };
         let second = parts & !first;
         let count = work.items.len();
         let Count { items, prims } = cell.count(first);
         let [a, b] = work.split_at(items as usize, prims as usize);
-        let grow_a = |k: &mut Vec<Knot>| self.grow_cell(cell, first, a, cell.bounds(first), k);
-        let grow_b = |k: &mut Vec<Knot>| self.grow_cell(cell, second, b, cell.bounds(second), k);
-        self.join(count, bounds, knots, grow_a, grow_b);
+        let grow_a = |g: &mut Growth| self.grow_cell(cell, first, a, cell.bounds(first), g);
+        let grow_b = |g: &mut Growth| self.grow_cell(cell, second, b, cell.bounds(second), g);
+        self.join(count, bounds, growth, grow_a, grow_b);
     }
 
     /// Adds a knot over `count` items and its two sides, which are grown in parallel where it is worth it.
@@ -193,22 +289,19 @@ impl Grower {
         &self,
         count: usize,
         bounds: Bounds,
-        knots: &mut Vec<Knot>,
-        first: impl FnOnce(&mut Vec<Knot>) + Send,
-        second: impl FnOnce(&mut Vec<Knot>) + Send,
+        growth: &mut Growth,
+        first: impl FnOnce(&mut Growth) + Send,
+        second: impl FnOnce(&mut Growth) + Send,
     ) {
-        let at = knots.len();
-        knots.push(Knot::fork(bounds.aabb(), 0));
         if count > self.parallel {
-            let mut beyond = Vec::new();
-            rayon::join(|| first(knots), || second(&mut beyond));
-            knots[at].at = index(knots.len() - at);
-            knots.append(&mut beyond);
-        } else {
-            first(knots);
-            knots[at].at = index(knots.len() - at);
-            second(knots);
+            return growth.fork_shared(bounds.aabb(), first, second);
         }
+        if growth.open.capacity() == 0 {
+            // Mostly more than there will be, and memory that nothing is written to costs nothing: larger room for what has no
+            // more stops all threads.
+            growth.open.reserve(count);
+        }
+        growth.fork(bounds.aabb(), first, second);
     }
 }
 
@@ -253,12 +346,12 @@ pub(super) mod tests {
     }
 
     fn grown_over(splitting: Splitting, mut items: Vec<Item>) -> (Vec<Knot>, Vec<u32>) {
-        let (mut spare, mut prims, mut knots) = (items.clone(), vec![0; items.len()], Vec::new());
+        let (mut spare, mut prims, mut growth) = (items.clone(), vec![0; items.len()], Growth::default());
         let bounds = crate::accel::wide::split::around(&items);
         let grower = Grower::new(splitting, items.len(), 1, &bounds, 8);
         let work = Work { items: &mut items, spare: &mut spare, prims: &mut prims, first: 0 };
-        grower.grow(work, bounds, None, &mut knots);
-        (knots, prims)
+        grower.grow(work, bounds, None, &mut growth);
+        (growth.finish().0, prims)
     }
 
     #[test]

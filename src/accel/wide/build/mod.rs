@@ -16,8 +16,9 @@ mod slots;
 
 use rayon::prelude::*;
 
+use self::collapse::Nodes;
 pub(in crate::accel) use self::grow::ALIKE;
-use self::grow::{Grower, Knot, Work};
+use self::grow::{Grower, Growth, Knot, Work};
 use super::node::{Arrays, Block, Child, index};
 use super::split::item::around_middles;
 use super::split::{Bounds, Item, Splitting, around};
@@ -32,114 +33,117 @@ const RUN: u32 = 2;
 /// Items or leaves that one thread takes at a time.
 const CHUNK: usize = 1024;
 
+/// Knots that one thread takes at a time.
+const SHARED: usize = 1 << 14;
+
 /// How much more than twice as deep an improved tree may be: what is recursive must not run out of stack.
 const ROOM: usize = 32;
 
 /// Builds the tree over all bounded prims, cut as if there were `times` as many.
 pub(super) fn build(shapes: &Shapes, splitting: Splitting, times: usize) -> Arrays {
     if shapes.bounded() == 0 {
-        return Arrays::new(&[], 0, Aabb::EMPTY);
+        return Nodes::default().into_arrays(0, Aabb::EMPTY);
     }
     let triangles = shapes.triangles.len();
-    let (grown, prims) = binary_tree(shapes, splitting, times);
-    let deep = 2 * depth(&grown) + ROOM;
-    let (mut knots, moved) = reinsert::improve(grown);
-    if moved && depth(&knots) > deep {
+    let Binary { knots: grown, depth: grown_depth, prims } = binary_tree(shapes, splitting, times);
+    let (mut knots, improved_depth) = reinsert::improve(grown);
+    if improved_depth.is_some_and(|depth| depth > deepest(grown_depth)) {
         // Where boxes hardly have an area rounding makes places better, and knots may be hung one below the other.
-        knots = binary_tree(shapes, splitting, times).0;
+        knots = binary_tree(shapes, splitting, times).knots;
     }
-    let leaves = Leaves::list(&mut knots, &prims, index(triangles));
+    let leaves = Leaves::list(&mut knots, index(triangles));
     let bounds = knots.first().map_or(Aabb::EMPTY, Knot::bounds);
-    let nodes = collapse::nodes(&knots);
+    let nodes = Nodes::over(&knots);
     drop(knots);
     // Empty slots lead to block 0, and a ray that no box can turn away goes there too.
-    let mut arrays = Arrays::new(&nodes, leaves.blocks.len().max(1), bounds);
-    drop(nodes);
+    let mut arrays = nodes.into_arrays(leaves.blocks.len().max(1), bounds);
     leaves.fill(arrays.blocks_mut(), shapes, &prims);
     arrays.with_runs(leaves.runs, prims[triangles..].to_vec())
 }
 
-/// Knots on the longest way down.
-fn depth(knots: &[Knot]) -> usize {
-    // Not all the way down: a tree may be too deep for that.
-    depth_from(knots, 6)
+/// How deep a tree may become that was so deep before it was improved.
+fn deepest(depth: usize) -> usize {
+    2 * depth + ROOM
 }
 
-/// The same, both sides at once as long as knots are worth it and `levels` are left.
-fn depth_from(knots: &[Knot], levels: u32) -> usize {
-    if let [root, below @ ..] = knots
-        && !root.is_leaf()
-        && knots.len() > CHUNK
-        && levels > 0
-    {
-        let (first, second) = below.split_at(root.at as usize - 1);
-        let (first, second) = rayon::join(|| depth_from(first, levels - 1), || depth_from(second, levels - 1));
-        return 1 + first.max(second);
-    }
-    let (mut left, mut most) = (vec![(0, 1)], 0);
-    while let Some((i, depth)) = left.pop() {
-        let Some(knot) = knots.get(i) else { continue };
-        most = most.max(depth);
-        if !knot.is_leaf() {
-            left.push((i + knot.at as usize, depth + 1));
-            left.push((i + 1, depth + 1));
-        }
-    }
-    most
+/// A binary tree over all bounded prims.
+struct Binary {
+    knots: Vec<Knot>,
+    /// Knots on the longest way down.
+    depth: usize,
+    /// The prims of leaves, in their order, triangles before others. A leaf holds triangles or other prims, never both.
+    prims: Vec<u32>,
 }
 
-/// The binary tree over all bounded prims, and the prims of its leaves. A leaf holds triangles or other prims, never both.
-fn binary_tree(shapes: &Shapes, splitting: Splitting, times: usize) -> (Vec<Knot>, Vec<u32>) {
+fn binary_tree(shapes: &Shapes, splitting: Splitting, times: usize) -> Binary {
     let first_other = index(shapes.triangles.len());
-    let mut triangles = items_of_triangles(shapes);
-    let others = (first_other..shapes.bounded()).into_par_iter().with_min_len(CHUNK);
-    let mut others: Vec<Item> = others.map(|prim| Item::of(shapes, prim)).collect();
     let mut prims = vec![0; shapes.bounded() as usize];
     let (triangle_prims, other_prims) = prims.split_at_mut(shapes.triangles.len());
-    let parts =
-        [(&mut triangles[..], triangle_prims, 0, LANES as u32), (&mut others[..], other_prims, first_other, RUN)];
-
-    let mut knots = Vec::new();
-    let mut both = Bounds::EMPTY;
-    for (items, prims, first, leaf) in parts {
-        if items.is_empty() {
-            continue;
-        }
-        let chunks = items.par_chunks(CHUNK);
-        let bounds = chunks.clone().map(around).reduce(|| Bounds::EMPTY, Bounds::join);
-        let middles = chunks.map(around_middles).reduce(|| Bounds::EMPTY, Bounds::join);
+    let grow = |items: Items, prims: &mut [u32], first: u32, leaf: u32, growth: &mut Growth| {
+        let Items { mut all, bounds, middles } = items;
         // Pages that nothing was written to are made by the threads that write there.
-        let spare = if splitting == Splitting::Octree { items.len() } else { 0 };
+        let spare = if splitting == Splitting::Octree { all.len() } else { 0 };
         let mut spare = bytemuck::zeroed_vec(spare);
-        let second = !knots.is_empty();
-        both = both.join(bounds);
-        if second {
-            // One knot over both.
-            knots.insert(0, Knot::fork(both.aabb(), index(knots.len() + 1)));
-        }
-        let grower = Grower::new(splitting, items.len(), times, &bounds, leaf);
-        grower.grow(Work { items, spare: &mut spare, prims, first }, bounds, Some(middles), &mut knots);
+        let grower = Grower::new(splitting, all.len(), times, &bounds, leaf);
+        grower.grow(Work { items: &mut all, spare: &mut spare, prims, first }, bounds, Some(middles), growth);
+    };
+    let (triangles, others) = (Items::of_triangles(shapes), Items::of_others(shapes));
+    let bounds = triangles.bounds.join(others.bounds).aabb();
+    let lack = [&triangles, &others].map(|items| items.all.is_empty());
+    let grow_triangles = |g: &mut Growth| grow(triangles, triangle_prims, 0, LANES as u32, g);
+    let grow_others = |g: &mut Growth| grow(others, other_prims, first_other, RUN, g);
+    let mut growth = Growth::default();
+    match lack {
+        [false, false] => growth.fork_shared(bounds, grow_triangles, grow_others),
+        [false, true] => grow_triangles(&mut growth),
+        [true, _] => grow_others(&mut growth),
     }
-    (knots, prims)
+    let (knots, depth) = growth.finish();
+    Binary { knots, depth, prims }
 }
 
-/// Items of all triangles, in their order.
-fn items_of_triangles(shapes: &Shapes) -> Vec<Item> {
-    // Each chunk has as many places as triangles; pages that nothing is written to cost nothing.
-    let mut items: Vec<Item> = bytemuck::zeroed_vec(shapes.triangles.len());
-    let chunks = items.par_chunks_mut(CHUNK).zip(shapes.triangles.par_chunks(CHUNK)).enumerate();
-    let counts: Vec<usize> =
-        chunks.map(|(i, (places, chunk))| Item::in_pairs(shapes, index(i * CHUNK), chunk, places)).collect();
-    let mut len = 0;
-    for (i, count) in counts.into_iter().enumerate() {
-        let start = i * CHUNK;
-        if start > len {
-            items.copy_within(start..start + count, len);
+/// What a tree is grown over.
+struct Items {
+    all: Vec<Item>,
+    bounds: Bounds,
+    /// The box around the middles, doubled.
+    middles: Bounds,
+}
+
+impl Items {
+    /// All triangles, in their order.
+    fn of_triangles(shapes: &Shapes) -> Self {
+        // Each chunk has as many places as triangles; pages that nothing is written to cost nothing.
+        let mut all: Vec<Item> = bytemuck::zeroed_vec(shapes.triangles.len());
+        let chunks = all.par_chunks_mut(CHUNK).zip(shapes.triangles.par_chunks(CHUNK)).enumerate();
+        let paired = chunks.map(|(i, (places, chunk))| {
+            let count = Item::in_pairs(shapes, index(i * CHUNK), chunk, places);
+            let items = &places[..count];
+            (count, around(items), around_middles(items))
+        });
+        let parts: Vec<(usize, Bounds, Bounds)> = paired.collect();
+        let (mut len, mut bounds, mut middles) = (0, Bounds::EMPTY, Bounds::EMPTY);
+        for (i, part) in parts.into_iter().enumerate() {
+            let (start, count) = (i * CHUNK, part.0);
+            if start > len {
+                all.copy_within(start..start + count, len);
+            }
+            len += count;
+            (bounds, middles) = (bounds.join(part.1), middles.join(part.2));
         }
-        len += count;
+        all.truncate(len);
+        Self { all, bounds, middles }
     }
-    items.truncate(len);
-    items
+
+    /// All other bounded prims.
+    fn of_others(shapes: &Shapes) -> Self {
+        let others = (index(shapes.triangles.len())..shapes.bounded()).into_par_iter().with_min_len(CHUNK);
+        let all: Vec<Item> = others.map(|prim| Item::of(shapes, prim)).collect();
+        let chunks = all.par_chunks(CHUNK);
+        let bounds = chunks.clone().map(around).reduce(|| Bounds::EMPTY, Bounds::join);
+        let middles = chunks.map(around_middles).reduce(|| Bounds::EMPTY, Bounds::join);
+        Self { all, bounds, middles }
+    }
 }
 
 /// Where the prims of a leaf are, and how many.
@@ -158,17 +162,43 @@ struct Leaves {
 }
 
 impl Leaves {
-    /// Lists the leaves among `knots`. Each then has the child that it is, packed, in place of its first prim.
-    fn list(knots: &mut [Knot], prims: &[u32], triangles: u32) -> Self {
+    /// Lists the leaves among `knots`, of which those of `triangles` come first among the prims. Each then has the child that
+    /// it is, packed, in place of its first prim.
+    fn list(knots: &mut [Knot], triangles: u32) -> Self {
+        let count = |chunk: &[Knot]| {
+            let leaves = chunk.iter().filter(|knot| knot.is_leaf());
+            leaves.fold([0, 0], |[blocks, runs], leaf| {
+                let block = u32::from(leaf.at < triangles);
+                [blocks + block, runs + 1 - block]
+            })
+        };
+        let counts: Vec<[u32; 2]> = knots.par_chunks(SHARED).map(count).collect();
+        let starts = counts.iter().scan([0, 0], |next, [blocks, runs]| {
+            let start = *next;
+            *next = [start[0] + blocks, start[1] + runs];
+            Some(start)
+        });
+        let chunks: Vec<(&mut [Knot], [u32; 2])> = knots.chunks_mut(SHARED).zip(starts).collect();
+        let mut all = Self::default();
+        let lists: Vec<Self> = chunks.into_par_iter().map(|(c, start)| Self::list_from(start, c, triangles)).collect();
+        for list in lists {
+            all.blocks.extend(list.blocks);
+            all.runs.extend(list.runs);
+        }
+        all
+    }
+
+    /// Of some knots, before which so many blocks and runs stand.
+    fn list_from([blocks, runs]: [u32; 2], knots: &mut [Knot], triangles: u32) -> Self {
         let mut all = Self::default();
         for knot in knots.iter_mut().filter(|knot| knot.is_leaf()) {
             let Knot { at, count, .. } = *knot;
-            let child = if prims[at as usize] < triangles {
+            let child = if at < triangles {
                 all.blocks.push((at, count));
-                Child::Block(index(all.blocks.len() - 1), count)
+                Child::Block(blocks + index(all.blocks.len() - 1), count)
             } else {
                 all.runs.push((at - triangles, count));
-                Child::Run(index(all.runs.len() - 1))
+                Child::Run(runs + index(all.runs.len() - 1))
             };
             knot.at = child.pack();
         }
@@ -197,8 +227,22 @@ fn block(shapes: &Shapes, prims: &[u32]) -> Block {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::SpherePrim;
     use crate::accel::tests::scenes::mesh;
     use crate::math::Vec3;
+
+    /// Knots on the longest way down.
+    pub(super) fn depth(knots: &[Knot]) -> usize {
+        let (mut left, mut most) = (vec![(0, 1)], 0);
+        while let Some((i, depth)) = left.pop() {
+            let knot = &knots[i];
+            most = most.max(depth);
+            if !knot.is_leaf() {
+                left.extend([(i + knot.at as usize, depth + 1), (i + 1, depth + 1)]);
+            }
+        }
+        most
+    }
 
     #[test]
     fn every_triangle_is_in_one_item_however_many_pairs_there_are() {
@@ -211,9 +255,40 @@ mod tests {
                 vertices.extend([corner, corner + Vec3::new(1.0, 0.2, 0.1), corner + Vec3::new(0.1, 1.0, 0.3)]);
             }
             let faces = (0..count as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-            let items = items_of_triangles(&mesh(vertices, faces));
+            let items = Items::of_triangles(&mesh(vertices, faces)).all;
             assert!(items.iter().flat_map(Item::prims).eq(0..count as u32), "{count} {near}");
             assert_eq!(items.len() < count, near > 0);
+        }
+    }
+
+    #[test]
+    fn a_large_tree_of_triangles_and_spheres_is_the_same_for_every_number_of_threads() {
+        let mut random = crate::math::random::Random::new(8);
+        let mut vertices = Vec::new();
+        for _ in 0..150_000 {
+            let corner = random.cube() * 50.0;
+            vertices.extend([corner, corner + random.cube(), corner + random.cube()]);
+        }
+        let faces = (0..150_000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let mut shapes = mesh(vertices, faces);
+        let sphere = |center| SpherePrim { center, radius: 0.5 };
+        shapes.spheres = (0..5000).map(|_| sphere(random.cube() * 50.0)).collect();
+        for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
+            let built = [1, 3].map(|threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| build(&shapes, splitting, 1))
+            });
+            let trees = built.each_ref().map(Arrays::tree);
+            let bytes = trees.map(|tree| {
+                let [nodes, blocks] = [bytemuck::cast_slice::<_, u8>(tree.nodes), bytemuck::cast_slice(tree.blocks)];
+                (nodes, blocks, tree.runs, tree.prims, tree.depth)
+            });
+            assert!(bytes[0] == bytes[1], "{splitting:?}");
+            let listed =
+                trees[0].blocks.iter().flat_map(|block| block.prims).filter(|&prim| prim != crate::accel::NO_PRIM);
+            let mut listed: Vec<u32> = listed.chain(trees[0].prims.iter().copied()).collect();
+            listed.sort_unstable();
+            assert!(listed.into_iter().eq(0..155_000), "{splitting:?}");
         }
     }
 
@@ -226,9 +301,10 @@ mod tests {
         let faces = (0..side * (side - 1) - 1).map(|i| [i, i + 1, i + side].map(|v| v as u32)).collect();
         let shapes = mesh(vertices, faces);
         for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
-            let (knots, _) = binary_tree(&shapes, splitting, 1);
-            let deep = 2 * depth(&knots) + ROOM;
-            let improved = depth(&reinsert::improve(knots).0);
+            let Binary { knots, depth: grown, .. } = binary_tree(&shapes, splitting, 1);
+            assert_eq!(grown, depth(&knots), "{splitting:?}");
+            let deep = deepest(grown);
+            let improved = reinsert::improve(knots).1.unwrap_or(grown);
             assert!(improved <= deep, "{splitting:?}: {improved}, places as good as another were taken for better");
             let arrays = build(&shapes, splitting, 1);
             let tree = arrays.tree();

@@ -9,9 +9,14 @@
 use super::grow::{Knot, index};
 use crate::accel::wide::split::Bounds;
 use crate::math::aabb::Aabb;
+use bytemuck::Zeroable;
+use rayon::prelude::*;
 
 /// Knots that are tried before it is asked whether that paid.
 const BATCH: usize = 256;
+
+/// Knots that are worth a thread's while.
+const CHUNK: usize = 1 << 14;
 
 /// It paid if one in so many moved.
 const WORTH: usize = 12;
@@ -29,21 +34,27 @@ const RETURNS: f32 = 0.75;
 /// A binary tree with links.
 struct Links {
     knots: Vec<Knot>,
-    /// Their boxes, which change.
-    boxes: Vec<Bounds>,
-    parents: Vec<u32>,
-    sides: Vec<[u32; 2]>,
+    links: Vec<Link>,
     /// Places still to be looked at: what is added above them, and the knot.
     open: Vec<(f32, u32)>,
     /// Knots on the way up from one.
     way: Vec<u32>,
 }
 
+/// What of a knot changes.
+#[derive(Clone, Copy, Zeroable)]
+struct Link {
+    bounds: Bounds,
+    parent: u32,
+    /// Both [`ROOT`] of a leaf.
+    sides: [u32; 2],
+}
+
 /// The root, which is never moved.
 const ROOT: u32 = 0;
 
-/// Improves a tree; whether anything was moved.
-pub(super) fn improve(knots: Vec<Knot>) -> (Vec<Knot>, bool) {
+/// Improves a tree; how many knots are on the longest way down, if anything was moved.
+pub(super) fn improve(knots: Vec<Knot>) -> (Vec<Knot>, Option<usize>) {
     let order = promising(&knots);
     let mut links = Links::new(knots);
     let mut any = false;
@@ -54,7 +65,11 @@ pub(super) fn improve(knots: Vec<Knot>) -> (Vec<Knot>, bool) {
             break;
         }
     }
-    (if any { links.in_order() } else { links.knots }, any)
+    if !any {
+        return (links.knots, None);
+    }
+    let (knots, depth) = links.in_order();
+    (knots, Some(depth))
 }
 
 /// The knots that may be tried, by falling promise.
@@ -62,78 +77,119 @@ pub(super) fn improve(knots: Vec<Knot>) -> (Vec<Knot>, bool) {
 /// Cuts leave small knots alone with large ones, in boxes much larger than they are, and what is saved by taking a knot out
 /// is that box.
 fn promising(knots: &[Knot]) -> Vec<(f32, u32)> {
-    let mut all = Vec::with_capacity(knots.len());
-    for (i, above) in (0..).zip(knots).filter(|(_, knot)| !knot.is_leaf()) {
-        for side in [i + 1, i + above.at] {
-            all.push((above.area() - knots[side as usize].area() * RETURNS, side));
-        }
-    }
-    let most = (all.len() / SHARE).min(MOST) + BATCH.min(all.len() / 4 + FEW);
+    // All but the root.
+    let all = knots.len().saturating_sub(1);
+    let most = (all / SHARE).min(MOST) + BATCH.min(all / 4 + FEW);
     let better = |a: &(f32, u32), b: &(f32, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
-    if most < all.len() {
-        all.select_nth_unstable_by(most, better);
-        all.truncate(most);
-    }
-    all.sort_unstable_by(better);
-    all
+    let best = |mut some: Vec<(f32, u32)>| {
+        if most < some.len() {
+            some.select_nth_unstable_by(most, better);
+            some.truncate(most);
+        }
+        some
+    };
+    let of_chunk = |(chunk, first): (&[Knot], usize)| {
+        let mut some = Vec::with_capacity(chunk.len());
+        for (i, above) in (index(first)..).zip(chunk).filter(|(_, knot)| !knot.is_leaf()) {
+            for side in [i + 1, i + above.at] {
+                some.push((above.area() - knots[side as usize].area() * RETURNS, side));
+            }
+        }
+        best(some)
+    };
+    let chunks = knots.par_chunks(CHUNK).zip((0..knots.len()).into_par_iter().step_by(CHUNK));
+    let mut best = chunks.map(of_chunk).reduce(Vec::new, |mut some, more| {
+        some.extend(more);
+        best(some)
+    });
+    best.sort_unstable_by(better);
+    best
+}
+
+/// Links a knot, the first of these, which is number `first` and stands below `parent`, and all below it.
+fn link(knots: &[Knot], first: u32, parent: u32, links: &mut [Link]) {
+    links[0].parent = parent;
+    let Some(root) = knots.first().filter(|_| knots.len() > CHUNK) else {
+        for (i, knot) in knots.iter().enumerate() {
+            links[i].bounds = knot.bounds().into();
+            if !knot.is_leaf() {
+                let (here, both) = (first + index(i), [i + 1, i + knot.at as usize]);
+                links[i].sides = both.map(|side| first + index(side));
+                both.iter().for_each(|&side| links[side].parent = here);
+            }
+        }
+        return;
+    };
+    let second = root.at as usize;
+    (links[0].bounds, links[0].sides) = (root.bounds().into(), [first + 1, first + root.at]);
+    let (first_links, second_links) = links.split_at_mut(second);
+    rayon::join(
+        || link(&knots[1..second], first + 1, first, &mut first_links[1..]),
+        || link(&knots[second..], first + root.at, first, second_links),
+    );
 }
 
 impl Links {
     fn new(knots: Vec<Knot>) -> Self {
-        let (mut parents, mut sides) = (vec![ROOT; knots.len()], vec![[ROOT; 2]; knots.len()]);
-        for (i, knot) in (0..).zip(&knots).filter(|(_, knot)| !knot.is_leaf()) {
-            let both = [i + 1, i + knot.at];
-            sides[i as usize] = both;
-            both.iter().for_each(|&side| parents[side as usize] = i);
-        }
-        let boxes = knots.iter().map(|knot| knot.bounds().into()).collect();
-        Self { knots, boxes, parents, sides, open: Vec::new(), way: Vec::new() }
+        let mut links = bytemuck::zeroed_vec(knots.len());
+        link(&knots, ROOT, ROOT, &mut links);
+        Self { knots, links, open: Vec::new(), way: Vec::new() }
     }
 
     #[inline(always)]
     fn bounds(&self, knot: u32) -> Bounds {
-        self.boxes[knot as usize]
+        self.links[knot as usize].bounds
+    }
+
+    #[inline(always)]
+    fn parent(&self, knot: u32) -> u32 {
+        self.links[knot as usize].parent
+    }
+
+    #[inline(always)]
+    fn sides(&self, knot: u32) -> [u32; 2] {
+        self.links[knot as usize].sides
     }
 
     /// Whether a knot was moved elsewhere.
     fn reinsert(&mut self, knot: u32) -> bool {
-        let parent = self.parents[knot as usize];
+        let parent = self.parent(knot);
         if parent == ROOT {
             return false;
         }
-        let [a, b] = self.sides[parent as usize];
+        let [a, b] = self.sides(parent);
         let sibling = if a == knot { b } else { a };
         self.replace(parent, sibling);
-        self.fit(self.parents[parent as usize]);
+        self.fit(self.parent(parent));
         let beside = self.best_place(self.bounds(knot), sibling);
         self.replace(beside, parent);
-        self.sides[parent as usize] = [beside, knot];
-        self.parents[beside as usize] = parent;
+        self.links[parent as usize].sides = [beside, knot];
+        self.links[beside as usize].parent = parent;
         // A box that happens to be the old one is above others now.
         self.fit(parent);
-        self.fit(self.parents[parent as usize]);
+        self.fit(self.parent(parent));
         beside != sibling
     }
 
     /// Puts `by` where `knot` is.
     fn replace(&mut self, knot: u32, by: u32) {
-        let above = self.parents[knot as usize];
-        let sides = &mut self.sides[above as usize];
+        let above = self.parent(knot);
+        let sides = &mut self.links[above as usize].sides;
         sides[usize::from(sides[1] == knot)] = by;
-        self.parents[by as usize] = above;
+        self.links[by as usize].parent = above;
     }
 
     /// Makes the boxes fit from a knot up to where they do already.
     fn fit(&mut self, mut knot: u32) {
         loop {
-            let [a, b] = self.sides[knot as usize].map(|side| self.bounds(side));
-            let (fitting, there) = (a.join(b), &mut self.boxes[knot as usize]);
+            let [a, b] = self.sides(knot).map(|side| self.bounds(side));
+            let (fitting, there) = (a.join(b), &mut self.links[knot as usize].bounds);
             let fits = fitting.lo.cmpeq(there.lo).all() & fitting.hi.cmpeq(there.hi).all();
             *there = fitting;
             if fits || knot == ROOT {
                 return;
             }
-            knot = self.parents[knot as usize];
+            knot = self.parent(knot);
         }
     }
 
@@ -153,8 +209,9 @@ impl Links {
                 (least, best) = (total, knot);
             }
             let added = (total - here.area()).max(0.0);
-            if added + alone < least && !self.knots[knot as usize].is_leaf() {
-                self.open.extend(self.sides[knot as usize].map(|side| (added, side)));
+            let sides = self.sides(knot);
+            if added + alone < least && sides != [ROOT; 2] {
+                self.open.extend(sides.map(|side| (added, side)));
             }
         }
         best
@@ -165,7 +222,7 @@ impl Links {
         self.way.clear();
         let mut above = knot;
         while above != ROOT {
-            above = self.parents[above as usize];
+            above = self.parent(above);
             self.way.push(above);
         }
         // From the root down, as the search adds.
@@ -176,29 +233,31 @@ impl Links {
         self.way.iter().rev().fold(0.0, grown) + self.bounds(knot).join(bounds).area()
     }
 
-    /// The knots in order again, each followed by its first side.
-    fn in_order(&self) -> Vec<Knot> {
+    /// The knots in order again, each followed by its first side; how many are on the longest way down.
+    fn in_order(&self) -> (Vec<Knot>, usize) {
         let mut knots = Vec::with_capacity(self.knots.len());
-        // What is still to come, and the knot whose second side it is.
-        let mut stack = vec![(ROOT, None)];
-        while let Some((knot, above)) = stack.pop() {
+        let mut deepest = 0;
+        // What is still to come, how deep it is, and the knot whose second side it is.
+        let mut stack = vec![(ROOT, 1, None)];
+        while let Some((knot, depth, above)) = stack.pop() {
+            deepest = deepest.max(depth);
             let at = knots.len();
             if let Some(above) = above {
                 let above: &mut Knot = &mut knots[above];
                 above.at = index(at) - above.at;
             }
             let mut copy = self.knots[knot as usize];
-            let Aabb { lo, hi } = self.boxes[knot as usize].aabb();
+            let Aabb { lo, hi } = self.bounds(knot).aabb();
             (copy.lo, copy.hi) = (lo, hi);
             if !copy.is_leaf() {
-                let [first, second] = self.sides[knot as usize];
+                let [first, second] = self.sides(knot);
                 // Until the second side is there, where the knot itself is.
                 copy.at = index(at);
-                stack.extend([(second, Some(at)), (first, None)]);
+                stack.extend([(second, depth + 1, Some(at)), (first, depth + 1, None)]);
             }
             knots.push(copy);
         }
-        knots
+        (knots, deepest)
     }
 }
 
@@ -219,8 +278,8 @@ mod tests {
         let large = leaf(6, 0.0, 5.5);
         let left = fork(fork(fork(small(0), large), small(1)), small(2));
         let knots = fork(left, fork(fork(small(3), small(4)), small(5)));
-        let (improved, moved) = improve(knots.clone());
-        assert!(moved);
+        let (improved, depth) = improve(knots.clone());
+        assert_eq!(depth, Some(super::super::tests::depth(&improved)));
         assert!(cost(&improved) < 0.7 * cost(&knots), "{} {}", cost(&improved), cost(&knots));
         // Checks the boxes and the links as well.
         let (mut before, mut after) = (leaves(&knots), leaves(&improved));

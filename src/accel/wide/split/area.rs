@@ -3,6 +3,7 @@
 use super::item::{Bounds, Item, around_middles};
 use super::{Cut, halves};
 use crate::math::{Mat4, Vec4};
+use rayon::prelude::*;
 
 /// Bins of each axis.
 const BINS: usize = 16;
@@ -13,6 +14,11 @@ const FEW: usize = 16;
 /// Of more items than these only one in so many is put into bins: that finds a cut as good, and memory is read less often.
 const MANY: usize = 1 << 11;
 const STRIDE: usize = 4;
+
+/// More items than these are cut by several threads, halves of them at a time; and so many are put into bins at a time. The
+/// same for every number of threads: so is the order of items.
+const SHARED: usize = 1 << 16;
+const CHUNK: usize = STRIDE << 12;
 
 /// Adding it to a small number leaves its nearest integer in the lowest bits.
 const TO_INTEGER: f32 = (1 << 23) as f32;
@@ -56,6 +62,29 @@ impl Ruler {
 
 impl<const N: usize> Bins<N> {
     const EMPTY: Self = Self { bounds: [[Bounds::EMPTY; 3]; N], counts: [[0; 4]; N] };
+
+    /// Of some of many items.
+    fn of_many(items: &[Item], ruler: &Ruler) -> Self {
+        let some = |items: &[Item]| {
+            let mut bins = Self::EMPTY;
+            bins.add(items.iter().step_by(STRIDE), ruler);
+            bins
+        };
+        if items.len() <= SHARED {
+            return some(items);
+        }
+        items.par_chunks(CHUNK).map(some).reduce(|| Self::EMPTY, Self::join)
+    }
+
+    fn join(mut self, other: Self) -> Self {
+        for (all, bounds) in self.bounds.as_flattened_mut().iter_mut().zip(other.bounds.as_flattened()) {
+            *all = all.join(*bounds);
+        }
+        for (all, count) in self.counts.as_flattened_mut().iter_mut().zip(other.counts.as_flattened()) {
+            *all += count;
+        }
+        self
+    }
 
     fn add<'i>(&mut self, items: impl Iterator<Item = &'i Item>, ruler: &Ruler) {
         for item in items {
@@ -143,7 +172,7 @@ fn cut_in<const N: usize>(items: &mut [Item], leaf: u32, middles: Option<Bounds>
     let ruler = Ruler::over(&middles.unwrap_or_else(|| around_middles(items)), N);
     let mut bins = Bins::<N>::EMPTY;
     if many {
-        bins.add(items.iter().step_by(STRIDE), &ruler);
+        bins = Bins::of_many(items, &ruler);
     } else {
         bins.add(items.iter(), &ruler);
     }
@@ -153,7 +182,7 @@ fn cut_in<const N: usize>(items: &mut [Item], leaf: u32, middles: Option<Bounds>
     let second = Vec4::splat(TO_INTEGER + place as f32);
     let is_first = |item: &Item| ruler.place(item).cmplt(second).bitmask() >> axis & 1 == 1;
     let cut = if many {
-        measured_partition(items, is_first)
+        shared_partition(items, &is_first)
     } else {
         let prims = bins.counts[..place].iter().map(|counts| counts[axis]).sum::<i32>().cast_unsigned() as usize;
         Cut { at: partition(items, is_first), prims, bounds: bins.parts(axis, place), middles: None }
@@ -174,7 +203,23 @@ fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
     at
 }
 
-/// The same, and the boxes of both parts.
+/// The same, and the boxes of both parts; by several threads.
+fn shared_partition(items: &mut [Item], first: &(impl Fn(&Item) -> bool + Sync)) -> Cut {
+    if items.len() <= SHARED {
+        return measured_partition(items, first);
+    }
+    let (front, back) = items.split_at_mut(items.len() / 2);
+    let (a, b) = rayon::join(|| shared_partition(front, first), || shared_partition(back, first));
+    // What is at the wrong end of each half changes places.
+    let count = (front.len() - a.at).min(b.at);
+    let seconds = front[a.at..][..count].par_chunks_mut(CHUNK);
+    seconds.zip(back[b.at - count..b.at].par_chunks_mut(CHUNK)).for_each(|(a, b)| a.swap_with_slice(b));
+    let both = |[a, b]: [Bounds; 2], [c, d]: [Bounds; 2]| [a.join(c), b.join(d)];
+    let middles = a.middles.zip(b.middles).map(|(a, b)| both(a, b));
+    Cut { at: a.at + b.at, prims: a.prims + b.prims, bounds: both(a.bounds, b.bounds), middles }
+}
+
+/// The same by one.
 fn measured_partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> Cut {
     let (mut at, mut prims, mut bounds, mut middles) = (0, 0, [Bounds::EMPTY; 2], [Bounds::EMPTY; 2]);
     for i in 0..items.len() {
@@ -236,6 +281,36 @@ mod tests {
                 assert_eq!(cut.prims, prims, "{count} {shape}");
                 assert!(items.iter().flat_map(Item::prims).count() == count as usize);
             }
+        }
+    }
+
+    #[test]
+    fn many_items_are_cut_by_several_threads_as_by_one() {
+        let mut random = Random::new(7);
+        let mut item = |prim| {
+            let at = random.cube() * Vec3::new(4.0, 1.0, 1.0);
+            Item::new(Aabb { lo: at, hi: at + random.unit() * 0.1 }, prim)
+        };
+        let items: Vec<Item> = (0..5 * SHARED as u32 / 2 + 3).map(&mut item).collect();
+        let ruler = Ruler::over(&around_middles(&items), BINS);
+        let mut alone = Bins::<BINS>::EMPTY;
+        alone.add(items.iter().step_by(STRIDE), &ruler);
+        let shared = Bins::<BINS>::of_many(&items, &ruler);
+        assert_eq!((shared.counts, shared.cheapest(8)), (alone.counts, alone.cheapest(8)));
+        let prims = |items: &[Item]| {
+            let mut prims: Vec<u32> = items.iter().map(Item::prim).collect();
+            prims.sort_unstable();
+            prims
+        };
+        // From hardly any in the first part to nearly all.
+        for place in [-3.9, -1.0, 0.0, 2.0, 3.99] {
+            let is_first = |item: &Item| item.bounds().lo.x < place;
+            let (mut one, mut several) = (items.clone(), items.clone());
+            let (a, b) = (measured_partition(&mut one, is_first), shared_partition(&mut several, &is_first));
+            assert_eq!((a.at, a.prims), (b.at, b.prims));
+            assert_eq!((prims(&one[..a.at]), prims(&one[a.at..])), (prims(&several[..b.at]), prims(&several[b.at..])));
+            let boxes = |cut: Cut| [cut.bounds, cut.middles.unwrap()].map(|both| both.map(|b| b.aabb()));
+            assert_eq!(boxes(a), boxes(b));
         }
     }
 
