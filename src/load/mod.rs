@@ -8,6 +8,7 @@ mod detect;
 pub mod diagnostic;
 mod geometry;
 pub mod gltf;
+mod jpeg;
 mod ktx;
 pub mod limits;
 mod mtl;

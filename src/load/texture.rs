@@ -6,7 +6,7 @@
 
 use super::diagnostic::RAISE_MEMORY;
 use super::limits::{Budget, Limits};
-use super::{Diagnostic, Warnings, ktx};
+use super::{Diagnostic, Warnings, jpeg, ktx};
 use crate::pages::Paged;
 use crate::scene::{Bitmap, Pixels};
 use crate::stopwatch::{Spent, Stopwatch};
@@ -56,9 +56,28 @@ pub fn decode_all(
     let mut decoded: Vec<_> = decoded.collect();
     decoded.sort_unstable_by_key(|(i, ..)| *i);
     let spent = Spent { wall: start.elapsed(), cpu: decoded.iter().map(|d| d.2).sum() };
-    let mut warn = |image: &Encoded, why: Unusable| warnings.push(why.warning(&image.name, file, &image.place));
-    let bitmaps = decoded.into_iter().map(|(i, result, _)| result.map_err(|why| warn(&images[i], why)).ok());
-    (bitmaps.collect(), spent)
+    let mut bitmaps = Vec::with_capacity(images.len());
+    for (image, (_, result, _)) in images.iter().zip(decoded) {
+        match &result {
+            Ok(_) => cut_off(image, file).into_iter().for_each(|told| warnings.push(told)),
+            Err(why) => warnings.push(why.warning(&image.name, file, &image.place)),
+        }
+        bitmaps.push(result.ok());
+    }
+    (bitmaps, spent)
+}
+
+/// What is told of a picture that was decoded, but whose file ends before its data does.
+fn cut_off(image: &Encoded, file: &Path) -> Option<Diagnostic> {
+    let bytes = &image.bytes;
+    let is_jpeg = ::image::guess_format(bytes).is_ok_and(|format| format == ImageFormat::Jpeg);
+    if !is_jpeg || !jpeg::is_cut_off(bytes) {
+        return None;
+    }
+    let name = super::paths::shorten(&image.name);
+    let text = format!("image '{name}' is cut off: its {} bytes have no end, and what is missing is grey", bytes.len());
+    let told = Diagnostic::new("image-cut-off", file, &image.place, text);
+    Some(told.remedy("copy, download or export the picture again"))
 }
 
 /// Why a picture cannot be used, and what helps.
@@ -78,7 +97,7 @@ impl Unusable {
     }
 
     /// What is told of the image of this name, which `file` names at `place`.
-    pub(super) fn warning(self, name: &str, file: &Path, place: &str) -> Diagnostic {
+    pub(super) fn warning(&self, name: &str, file: &Path, place: &str) -> Diagnostic {
         let text = format!("image '{}' cannot be used: {}", super::paths::shorten(name), self.why);
         let remedy = format!("the material is drawn without it; {}", self.remedy);
         Diagnostic::new("image-unusable", file, place, text).remedy(remedy)
@@ -393,6 +412,17 @@ mod tests {
             assert_eq!(warnings.len(), 1);
             assert!(warnings[0].to_string().starts_with("m.obj:7: image 'a.png' cannot be used: "), "{}", warnings[0]);
         }
+    }
+
+    #[test]
+    fn a_jpeg_that_was_cut_off_is_drawn_as_far_as_it_goes_and_told() {
+        let noise = |x: u32, y: u32| ::image::Rgb([(x * 37 ^ y * 91) as u8, (x * y) as u8, y as u8]);
+        let whole = file(&::image::RgbImage::from_fn(64, 64, noise).into(), ImageFormat::Jpeg);
+        let (bitmap, warnings) = decode_one(&whole, &Limits::default());
+        assert!(bitmap.is_some() && warnings.is_empty());
+        let (bitmap, warnings) = decode_one(&whole[..whole.len() * 2 / 3], &Limits::default());
+        assert!(bitmap.is_some());
+        assert_eq!((warnings.len(), warnings[0].code), (1, "image-cut-off"));
     }
 
     #[test]
