@@ -1,4 +1,4 @@
-//! Whether a JPEG picture is all there: its decoder leaves grey what is missing, and says nothing.
+//! Whether a JPEG picture is all there: its decoder leaves what is missing grey or coarse, and says nothing.
 
 /// Whether the data of a JPEG picture has no end (marker EOI; ITU-T T.81, *Digital Compression and Coding of Continuous-Tone
 /// Still Images*, 1992, B.1.1.3).
@@ -12,6 +12,8 @@ pub(super) fn is_cut_off(bytes: &[u8]) -> bool {
         rest = match rest {
             // Any number of these may stand before a marker.
             [0xff, 0xff, ..] => &rest[1..],
+            // No marker: for the decoder to judge.
+            [0xff, 0, ..] => return false,
             [0xff, SOS, ..] => return !rest.windows(2).rev().any(|pair| pair == EOI),
             [0xff, _, high, low, ..] => {
                 let length = usize::from(u16::from_be_bytes([*high, *low]));
@@ -19,7 +21,6 @@ pub(super) fn is_cut_off(bytes: &[u8]) -> bool {
                 behind
             }
             [] | [0xff, ..] => return true,
-            // What is no marker here is for the decoder to judge.
             _ => return false,
         }
     }
@@ -31,7 +32,7 @@ mod tests {
     use ::image::codecs::jpeg::JpegEncoder;
 
     fn noise() -> ::image::RgbImage {
-        ::image::RgbImage::from_fn(64, 48, |x, y| ::image::Rgb([(x * 37 ^ y * 91) as u8, (x * y) as u8, y as u8]))
+        ::image::RgbImage::from_fn(64, 48, |x, y| ::image::Rgb([((x * 37) ^ (y * 91)) as u8, (x * y) as u8, y as u8]))
     }
 
     fn jpeg() -> Vec<u8> {

@@ -1,7 +1,7 @@
 //! Pictures of surroundings: Radiance HDR, OpenEXR, and 8- or 16-bit pictures, whose colours are sRGB and which cameras turn.
 
 use super::limits::{Budget, Limits};
-use super::texture::{format_of, within};
+use super::texture::{cut_off, format_of, within};
 use super::{Diagnostic, LoadError, Source};
 use crate::math::primaries::Primaries;
 use crate::math::{DMat3, DVec3};
@@ -75,7 +75,8 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
         None => return Err(fault("cannot be decoded: it is damaged".into())),
     };
     let (width, height) = (picture.width(), picture.height());
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<Diagnostic> =
+        cut_off(&source.path.to_string_lossy(), bytes, &source.path, "").into_iter().collect();
     if u64::from(width) != 2 * u64::from(height) {
         let text =
             format!("is {width}×{height}: a panorama of all around is twice as wide as high, so it is stretched");

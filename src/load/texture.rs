@@ -2,7 +2,7 @@
 //!
 //! The kind of picture is found by its bytes, whatever its name or declared type says, but for TGA, whose bytes say
 //! little. Colour profiles, gamma chunks and EXIF orientation are ignored, as glTF demands. A picture that is missing or
-//! broken costs a warning; the material goes on without that map.
+//! broken costs a warning, and the material goes on without that map; a JPEG that was cut off is told of, and used.
 
 use super::diagnostic::RAISE_MEMORY;
 use super::limits::{Budget, Limits};
@@ -29,8 +29,8 @@ pub struct Encoded<'a> {
     pub bytes: std::borrow::Cow<'a, [u8]>,
 }
 
-/// Decodes all, in parallel; `None` for each that could not be, with a warning about `file`. And the time that took, of
-/// all threads together.
+/// Decodes all, in parallel; `None` for each that could not be, with a warning about `file`, as there is about one that was cut
+/// off. And the time that took, of all threads together.
 ///
 /// Sizes are checked against `limits` and `budget` before anything is decoded.
 pub fn decode_all(
@@ -58,26 +58,25 @@ pub fn decode_all(
     let spent = Spent { wall: start.elapsed(), cpu: decoded.iter().map(|d| d.2).sum() };
     let mut bitmaps = Vec::with_capacity(images.len());
     for (image, (_, result, _)) in images.iter().zip(decoded) {
-        match &result {
-            Ok(_) => cut_off(image, file).into_iter().for_each(|told| warnings.push(told)),
-            Err(why) => warnings.push(why.warning(&image.name, file, &image.place)),
-        }
-        bitmaps.push(result.ok());
+        let (bitmap, told) = match result {
+            Ok(bitmap) => (Some(bitmap), cut_off(&image.name, &image.bytes, file, &image.place)),
+            Err(why) => (None, Some(why.warning(&image.name, file, &image.place))),
+        };
+        told.into_iter().for_each(|told| warnings.push(told));
+        bitmaps.push(bitmap);
     }
     (bitmaps, spent)
 }
 
-/// What is told of a picture that was decoded, but whose file ends before its data does.
-fn cut_off(image: &Encoded, file: &Path) -> Option<Diagnostic> {
-    let bytes = &image.bytes;
+/// What is told of a picture that can be decoded, but whose file ends before its data does; `file` names it at `place`.
+pub(super) fn cut_off(name: &str, bytes: &[u8], file: &Path, place: &str) -> Option<Diagnostic> {
     let is_jpeg = ::image::guess_format(bytes).is_ok_and(|format| format == ImageFormat::Jpeg);
     if !is_jpeg || !jpeg::is_cut_off(bytes) {
         return None;
     }
-    let name = super::paths::shorten(&image.name);
-    let text = format!("image '{name}' is cut off: its {} bytes have no end, and what is missing is grey", bytes.len());
-    let told = Diagnostic::new("image-cut-off", file, &image.place, text);
-    Some(told.remedy("copy, download or export the picture again"))
+    let (name, len) = (super::paths::shorten(name), bytes.len());
+    let text = format!("image '{name}' is cut off: its {len} bytes have no end, and what is missing is grey or coarse");
+    Some(Diagnostic::new("image-cut-off", file, place, text).remedy("copy, download or export the picture again"))
 }
 
 /// Why a picture cannot be used, and what helps.
@@ -97,7 +96,7 @@ impl Unusable {
     }
 
     /// What is told of the image of this name, which `file` names at `place`.
-    pub(super) fn warning(&self, name: &str, file: &Path, place: &str) -> Diagnostic {
+    pub(super) fn warning(self, name: &str, file: &Path, place: &str) -> Diagnostic {
         let text = format!("image '{}' cannot be used: {}", super::paths::shorten(name), self.why);
         let remedy = format!("the material is drawn without it; {}", self.remedy);
         Diagnostic::new("image-unusable", file, place, text).remedy(remedy)
@@ -416,7 +415,7 @@ mod tests {
 
     #[test]
     fn a_jpeg_that_was_cut_off_is_drawn_as_far_as_it_goes_and_told() {
-        let noise = |x: u32, y: u32| ::image::Rgb([(x * 37 ^ y * 91) as u8, (x * y) as u8, y as u8]);
+        let noise = |x: u32, y: u32| ::image::Rgb([((x * 37) ^ (y * 91)) as u8, (x * y) as u8, y as u8]);
         let whole = file(&::image::RgbImage::from_fn(64, 64, noise).into(), ImageFormat::Jpeg);
         let (bitmap, warnings) = decode_one(&whole, &Limits::default());
         assert!(bitmap.is_some() && warnings.is_empty());

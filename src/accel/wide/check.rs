@@ -25,15 +25,22 @@ impl Wide<'_> {
         stats
     }
 
-    /// Visits everything: each bounded prim is in one leaf, the box of every slot holds all prims below it, and blocks
-    /// hold the corners of their triangles.
+    /// Visits everything: each bounded prim is in one leaf, the box of every slot holds all prims below it, blocks hold the
+    /// corners of their triangles, and the tree is as deep as it says, by which stacks are made.
     pub fn check(&self) -> Result<StructureStats, String> {
         let mut leaves = vec![0u32; self.shapes.bounded() as usize];
         let mut failure = None;
         if !self.tree().nodes.is_empty() {
             self.holds(0, &mut leaves, &mut failure);
         }
-        failure.map_or_else(|| listed_once(&leaves, "leaves"), Err).map(|()| self.summary())
+        failure.map_or_else(|| listed_once(&leaves, "leaves"), Err)?;
+        let (summary, depth) = (self.summary(), self.tree().depth);
+        let nodes = if self.tree().nodes.is_empty() { 0 } else { 1 + summary.depth };
+        if nodes == depth {
+            Ok(summary)
+        } else {
+            Err(format!("{nodes} nodes are on the longest way down, not {depth}"))
+        }
     }
 
     /// The box of all prims below a node, exactly; counts their leaves.

@@ -173,7 +173,8 @@ pub(super) struct Tree<'a> {
 
 impl Arrays {
     /// The nodes of these pieces, one behind the other, of which the first is the root, in these bounds, and room for so many
-    /// blocks. Nodes are numbered within their piece; `depth` are on the longest way down.
+    /// blocks. Children are numbered within their piece, and those of the first piece in the whole; `depth` nodes are on the
+    /// longest way down.
     pub(super) fn new(pieces: &[Vec<Node>], depth: u32, blocks: usize, bounds: Aabb) -> Self {
         let nodes = pieces.iter().map(Vec::len).sum();
         let mut lines = Paged::zeroed(OF_NODE * nodes + OF_BLOCK * blocks);

@@ -297,7 +297,7 @@ mod tests {
             (Code::GlbInvalidMagic, "`detect` says what the file is instead"),
             (Code::IoError, "file-missing, file-unreadable and others, from `paths`"),
             (Code::NonRelativeUri, "uri-scheme, from `paths`"),
-            (Code::ImageUnexpectedEos, "image-unusable, from `texture`"),
+            (Code::ImageUnexpectedEos, "image-unusable or image-cut-off, from `texture`"),
             (Code::ArrayTypeMismatch, "a type mismatch of an element"),
         ];
         let sources = [

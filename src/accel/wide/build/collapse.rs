@@ -11,7 +11,7 @@ use std::ops::Range;
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
-use super::grow::Knot;
+use super::knots::Knot;
 use super::slots::slots;
 use crate::accel::wide::node::{Arrays, Child, Node, index};
 use crate::math::aabb::Aabb;
@@ -20,8 +20,8 @@ use crate::math::simd::LANES;
 /// Knots that are worth a thread's while.
 const PARALLEL: usize = 512;
 
-/// Of so many parts of a tree one is worth a piece. The same for every number of threads: so is the order of nodes.
-const PARTS: usize = 64;
+/// A subtree of at most this part of all knots is a piece. The same for every number of threads: so is the order of nodes.
+const PIECES: usize = 64;
 
 /// How many rays start or end at a shape where one comes from afar.
 const NEAR: f32 = 0.15;
@@ -104,7 +104,7 @@ impl Nodes {
         let collapse = Collapse { knots, plans: &plans };
 
         let (mut top, mut subtrees) = (Vec::new(), Vec::new());
-        let largest = PARALLEL.max(knots.len() / PARTS);
+        let largest = PARALLEL.max(knots.len() / PIECES);
         collapse.top(0..knots.len(), 0, largest, &mut top, &mut subtrees);
         let built = subtrees.par_iter().map(|subtree: &Subtree| {
             let mut nodes = Vec::new();
@@ -227,7 +227,7 @@ impl Collapse<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::grow::tests::{fork, leaf};
+    use super::super::knots::tests::{fork, leaf};
     use super::*;
 
     /// The children of each node: how many there are, and how many of them are nodes.

@@ -1,11 +1,8 @@
 //! A binary tree, from the root down.
 
 use super::cell::{Cell, Count, Lattice};
+use super::knots::{Growth, Knot, index};
 use crate::accel::wide::split::{Bounds, Cut, Item, Splitting, cut_by_area};
-use crate::math::Vec3;
-use crate::math::aabb::Aabb;
-use bytemuck::Zeroable;
-use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
 /// Fewer items are not worth a thread's while.
@@ -13,9 +10,6 @@ const PARALLEL: usize = 1024;
 
 /// Parts for each thread.
 const PARTS: usize = 16;
-
-/// Pieces of no more knots are put together.
-const PIECE: usize = 256;
 
 /// Cells of few items are not cut at their planes but by area, which fills leaves better: of no more than this part of all
 /// items and no more than so many, but always of so few.
@@ -30,136 +24,6 @@ pub(in crate::accel) const ALIKE: usize = *SMALL_CELL.start();
 const LARGE_LEAF: f32 = 1.0 / 2048.0;
 const WORTH_CUTTING: f32 = 0.8;
 const FLAT: f32 = 0.1;
-
-/// A node of the binary tree. They stand in an array, each followed by all that is below it, first side first.
-#[derive(Clone, Copy, Debug, Zeroable)]
-pub(super) struct Knot {
-    pub lo: Vec3,
-    /// Of a leaf the first of its prims, in the end the packed child that it is; of another knot how many knots further on
-    /// its second side is.
-    pub at: u32,
-    pub hi: Vec3,
-    /// Prims of a leaf; 0: no leaf.
-    pub count: u32,
-}
-
-impl Knot {
-    pub(super) fn leaf(bounds: Aabb, first: u32, count: u32) -> Self {
-        Self { lo: bounds.lo, at: first, hi: bounds.hi, count }
-    }
-
-    pub(super) fn fork(bounds: Aabb, second: u32) -> Self {
-        Self { lo: bounds.lo, at: second, hi: bounds.hi, count: 0 }
-    }
-
-    #[inline]
-    pub(super) fn bounds(&self) -> Aabb {
-        Aabb { lo: self.lo, hi: self.hi }
-    }
-
-    #[inline]
-    pub(super) fn is_leaf(&self) -> bool {
-        self.count > 0
-    }
-
-    /// Half the surface of its box.
-    #[inline]
-    pub(super) fn area(&self) -> f32 {
-        let d = self.hi - self.lo;
-        d.x * d.y + d.y * d.z + d.z * d.x
-    }
-}
-
-/// A tree while it grows: its knots in their order, in pieces that are not moved until it is known how many there are.
-#[derive(Default)]
-pub(super) struct Growth {
-    pieces: Vec<Vec<Knot>>,
-    /// The last piece, which knots are added to.
-    open: Vec<Knot>,
-    /// Knots above the next one.
-    above: usize,
-    /// Knots on the longest way down.
-    depth: usize,
-}
-
-impl Growth {
-    /// Begins below so many knots.
-    fn below(above: usize) -> Self {
-        Self { above, ..Self::default() }
-    }
-
-    fn len(&self) -> usize {
-        self.pieces.iter().chain([&self.open]).map(Vec::len).sum()
-    }
-
-    /// Adds a knot over what `first` and `second` add.
-    fn fork(&mut self, bounds: Aabb, first: impl FnOnce(&mut Self), second: impl FnOnce(&mut Self)) {
-        let at = self.open.len();
-        self.add(Knot::fork(bounds, 0));
-        self.above += 1;
-        first(self);
-        self.open[at].at = index(self.open.len() - at);
-        second(self);
-        self.above -= 1;
-    }
-
-    /// The same by two threads.
-    pub(super) fn fork_shared(
-        &mut self,
-        bounds: Aabb,
-        first: impl FnOnce(&mut Self) + Send,
-        second: impl FnOnce(&mut Self) + Send,
-    ) {
-        let before = self.len();
-        self.add(Knot::fork(bounds, 0));
-        self.close();
-        let piece = self.pieces.len() - 1;
-        let at = self.pieces[piece].len() - 1;
-        self.above += 1;
-        let mut beyond = Self::below(self.above);
-        rayon::join(|| first(self), || second(&mut beyond));
-        self.above -= 1;
-        self.pieces[piece][at].at = index(self.len() - before);
-        self.close();
-        beyond.pieces.into_iter().for_each(|piece| self.put(piece));
-        self.open = beyond.open;
-        self.depth = self.depth.max(beyond.depth);
-    }
-
-    fn add(&mut self, knot: Knot) {
-        self.depth = self.depth.max(self.above + 1);
-        self.open.push(knot);
-    }
-
-    /// Ends the last piece.
-    fn close(&mut self) {
-        let piece = std::mem::take(&mut self.open);
-        self.put(piece);
-    }
-
-    /// Puts a piece behind the others.
-    fn put(&mut self, piece: Vec<Knot>) {
-        match self.pieces.last_mut() {
-            Some(last) if last.len() + piece.len() <= PIECE => last.extend(piece),
-            _ => self.pieces.push(piece),
-        }
-    }
-
-    /// All knots, and how many are on the longest way down.
-    pub(super) fn finish(mut self) -> (Vec<Knot>, usize) {
-        if self.pieces.is_empty() {
-            return (self.open, self.depth);
-        }
-        self.close();
-        // Each thread makes the pages that it writes to.
-        let mut knots = bytemuck::zeroed_vec(self.len());
-        let mut rest = &mut knots[..];
-        let places: Vec<&mut [Knot]> =
-            self.pieces.iter().map(|piece| rest.split_off_mut(..piece.len()).unwrap_or_default()).collect();
-        self.pieces.into_par_iter().zip(places).for_each(|(piece, place)| place.copy_from_slice(&piece));
-        (knots, self.depth)
-    }
-}
 
 /// What a tree is grown over.
 pub(super) struct Work<'w> {
@@ -296,49 +160,19 @@ impl Grower {
         if count > self.parallel {
             return growth.fork_shared(bounds.aabb(), first, second);
         }
-        if growth.open.capacity() == 0 {
-            // Mostly more than there will be, and memory that nothing is written to costs nothing: larger room for what has no
-            // more stops all threads.
-            growth.open.reserve(count);
-        }
+        // Mostly more than there will be, and memory that nothing is written to costs nothing: to enlarge what is full stops all
+        // threads. What is below has fewer items, and is not shared either.
+        growth.begin(count);
         growth.fork(bounds.aabb(), first, second);
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "knots are fewer than twice the prims, which loading keeps below 2³²"
-)]
-pub(super) fn index(i: usize) -> u32 {
-    i as u32
-}
-
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
+    use super::super::knots::tests::leaves;
     use super::*;
-
-    /// A leaf of one prim: a cube from `lo` to `hi` on every axis.
-    pub(in super::super) fn leaf(prim: u32, lo: f32, hi: f32) -> Vec<Knot> {
-        vec![Knot::leaf(Aabb { lo: Vec3::splat(lo), hi: Vec3::splat(hi) }, prim, 1)]
-    }
-
-    /// A knot over two trees.
-    pub(in super::super) fn fork(first: Vec<Knot>, second: Vec<Knot>) -> Vec<Knot> {
-        let root = Knot::fork(first[0].bounds().union(second[0].bounds()), index(first.len() + 1));
-        [vec![root], first, second].concat()
-    }
-
-    /// The first prim of each leaf; every box is the smallest around what is below it.
-    pub(in super::super) fn leaves(knots: &[Knot]) -> Vec<u32> {
-        let root = &knots[0];
-        if root.is_leaf() {
-            assert_eq!(knots.len(), 1);
-            return vec![root.at];
-        }
-        let (first, second) = knots[1..].split_at(root.at as usize - 1);
-        assert_eq!(first[0].bounds().union(second[0].bounds()), root.bounds());
-        [leaves(first), leaves(second)].concat()
-    }
+    use crate::math::Vec3;
+    use crate::math::aabb::Aabb;
 
     fn grown(splitting: Splitting, at: &[Vec3]) -> (Vec<Knot>, Vec<u32>) {
         let item = |(prim, &p): (u32, &Vec3)| Item::new(Aabb { lo: p, hi: p + 0.25 }, prim);

@@ -1,6 +1,6 @@
 //! From shapes to a tree.
 //!
-//! A binary tree is grown from the root down ([`grow`]), improved where large and small faces are mixed ([`reinsert`]) and
+//! A binary tree ([`knots`]) is grown from the root down ([`grow`]), improved where large and small faces are mixed ([`reinsert`]) and
 //! fused into nodes of eight ([`collapse`]). Its leaves become blocks. Large parts are worked on by several threads; what
 //! they make is joined in order, so that the tree does not depend on their number.
 //!
@@ -11,6 +11,7 @@
 mod cell;
 mod collapse;
 mod grow;
+mod knots;
 mod reinsert;
 mod slots;
 
@@ -18,7 +19,8 @@ use rayon::prelude::*;
 
 use self::collapse::Nodes;
 pub(in crate::accel) use self::grow::ALIKE;
-use self::grow::{Grower, Growth, Knot, Work};
+use self::grow::{Grower, Work};
+use self::knots::{Growth, Knot};
 use super::node::{Arrays, Block, Child, index};
 use super::split::item::around_middles;
 use super::split::{Bounds, Item, Splitting, around};
@@ -34,7 +36,7 @@ const RUN: u32 = 2;
 const CHUNK: usize = 1024;
 
 /// Knots that one thread takes at a time.
-const SHARED: usize = 1 << 14;
+const KNOTS: usize = 1 << 14;
 
 /// How much more than twice as deep an improved tree may be: what is recursive must not run out of stack.
 const ROOM: usize = 32;
@@ -162,8 +164,8 @@ struct Leaves {
 }
 
 impl Leaves {
-    /// Lists the leaves among `knots`, of which those of `triangles` come first among the prims. Each then has the child that
-    /// it is, packed, in place of its first prim.
+    /// Lists the leaves among `knots`, over prims of which the first `triangles` are triangles. Each then has the child that it
+    /// is, packed, in place of its first prim.
     fn list(knots: &mut [Knot], triangles: u32) -> Self {
         let count = |chunk: &[Knot]| {
             let leaves = chunk.iter().filter(|knot| knot.is_leaf());
@@ -172,20 +174,18 @@ impl Leaves {
                 [blocks + block, runs + 1 - block]
             })
         };
-        let counts: Vec<[u32; 2]> = knots.par_chunks(SHARED).map(count).collect();
+        let counts: Vec<[u32; 2]> = knots.par_chunks(KNOTS).map(count).collect();
         let starts = counts.iter().scan([0, 0], |next, [blocks, runs]| {
             let start = *next;
             *next = [start[0] + blocks, start[1] + runs];
             Some(start)
         });
-        let chunks: Vec<(&mut [Knot], [u32; 2])> = knots.chunks_mut(SHARED).zip(starts).collect();
-        let mut all = Self::default();
+        let chunks: Vec<(&mut [Knot], [u32; 2])> = knots.chunks_mut(KNOTS).zip(starts).collect();
         let lists: Vec<Self> = chunks.into_par_iter().map(|(c, start)| Self::list_from(start, c, triangles)).collect();
-        for list in lists {
-            all.blocks.extend(list.blocks);
-            all.runs.extend(list.runs);
+        Self {
+            blocks: lists.iter().map(|list| &list.blocks[..]).collect::<Vec<_>>().concat(),
+            runs: lists.iter().map(|list| &list.runs[..]).collect::<Vec<_>>().concat(),
         }
-        all
     }
 
     /// Of some knots, before which so many blocks and runs stand.
@@ -226,23 +226,11 @@ fn block(shapes: &Shapes, prims: &[u32]) -> Block {
 
 #[cfg(test)]
 mod tests {
+    use super::knots::tests::{depth, leaves};
     use super::*;
-    use crate::accel::SpherePrim;
     use crate::accel::tests::scenes::mesh;
+    use crate::accel::{SpherePrim, Wide};
     use crate::math::Vec3;
-
-    /// Knots on the longest way down.
-    pub(super) fn depth(knots: &[Knot]) -> usize {
-        let (mut left, mut most) = (vec![(0, 1)], 0);
-        while let Some((i, depth)) = left.pop() {
-            let knot = &knots[i];
-            most = most.max(depth);
-            if !knot.is_leaf() {
-                left.extend([(i + knot.at as usize, depth + 1), (i + 1, depth + 1)]);
-            }
-        }
-        most
-    }
 
     #[test]
     fn every_triangle_is_in_one_item_however_many_pairs_there_are() {
@@ -284,11 +272,27 @@ mod tests {
                 (nodes, blocks, tree.runs, tree.prims, tree.depth)
             });
             assert!(bytes[0] == bytes[1], "{splitting:?}");
-            let listed =
-                trees[0].blocks.iter().flat_map(|block| block.prims).filter(|&prim| prim != crate::accel::NO_PRIM);
-            let mut listed: Vec<u32> = listed.chain(trees[0].prims.iter().copied()).collect();
-            listed.sort_unstable();
-            assert!(listed.into_iter().eq(0..155_000), "{splitting:?}");
+            let checked = Wide::build(&shapes, splitting).check();
+            assert!(checked.is_ok(), "{splitting:?}: {checked:?}");
+            let Binary { knots, depth: grown, .. } = binary_tree(&shapes, splitting, 1);
+            assert_eq!((grown, leaves(&knots).len()), (depth(&knots), knots.len().div_ceil(2)), "{splitting:?}");
+        }
+    }
+
+    /// Where areas are too small to be told from zero, every cut takes off as little as it can.
+    #[test]
+    fn a_tree_of_hundreds_of_levels_that_threads_share_fits_on_their_stacks() {
+        let place = |i: i32| -1e-24 * 0.93f32.powi(i.min(700));
+        let corners = |x: f32| [Vec3::new(x, 0.0, 0.0), Vec3::new(x, 1e-25, 0.0), Vec3::new(x, 0.0, 1e-25)];
+        let vertices: Vec<Vec3> = (0..30_000).flat_map(|i| corners(place(i))).collect();
+        let faces = (0..30_000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let shapes = mesh(vertices, faces);
+        let pool = crate::threads::pool(2).unwrap();
+        for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
+            let Binary { knots, depth: grown, .. } = pool.install(|| binary_tree(&shapes, splitting, 1));
+            assert_eq!(grown, depth(&knots));
+            let checked = pool.install(|| Wide::build(&shapes, splitting).check());
+            assert!(checked.is_ok(), "{splitting:?}, {grown} deep: {checked:?}");
         }
     }
 

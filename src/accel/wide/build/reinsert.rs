@@ -6,7 +6,7 @@
 //! surface costs hardly more than looking, and large faces before small ones, which cuts between middles handle badly, are
 //! put where they do the least harm. One after the other, so that the result does not depend on threads.
 
-use super::grow::{Knot, index};
+use super::knots::{Knot, index};
 use crate::accel::wide::split::Bounds;
 use crate::math::aabb::Aabb;
 use bytemuck::Zeroable;
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 /// Knots that are tried before it is asked whether that paid.
 const BATCH: usize = 256;
 
-/// Knots that are worth a thread's while.
+/// Knots that one thread takes at a time.
 const CHUNK: usize = 1 << 14;
 
 /// It paid if one in so many moved.
@@ -78,8 +78,8 @@ pub(super) fn improve(knots: Vec<Knot>) -> (Vec<Knot>, Option<usize>) {
 /// is that box.
 fn promising(knots: &[Knot]) -> Vec<(f32, u32)> {
     // All but the root.
-    let all = knots.len().saturating_sub(1);
-    let most = (all / SHARE).min(MOST) + BATCH.min(all / 4 + FEW);
+    let count = knots.len().saturating_sub(1);
+    let most = (count / SHARE).min(MOST) + BATCH.min(count / 4 + FEW);
     let better = |a: &(f32, u32), b: &(f32, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
     let best = |mut some: Vec<(f32, u32)>| {
         if most < some.len() {
@@ -88,28 +88,28 @@ fn promising(knots: &[Knot]) -> Vec<(f32, u32)> {
         }
         some
     };
-    let of_chunk = |(chunk, first): (&[Knot], usize)| {
-        let mut some = Vec::with_capacity(chunk.len());
-        for (i, above) in (index(first)..).zip(chunk).filter(|(_, knot)| !knot.is_leaf()) {
+    let of_chunk = |(number, chunk): (usize, &[Knot])| {
+        let mut some = Vec::with_capacity(2 * chunk.len());
+        for (i, above) in (index(number * CHUNK)..).zip(chunk).filter(|(_, knot)| !knot.is_leaf()) {
             for side in [i + 1, i + above.at] {
                 some.push((above.area() - knots[side as usize].area() * RETURNS, side));
             }
         }
         best(some)
     };
-    let chunks = knots.par_chunks(CHUNK).zip((0..knots.len()).into_par_iter().step_by(CHUNK));
-    let mut best = chunks.map(of_chunk).reduce(Vec::new, |mut some, more| {
+    let both = |mut some: Vec<(f32, u32)>, more: Vec<(f32, u32)>| {
         some.extend(more);
         best(some)
-    });
-    best.sort_unstable_by(better);
-    best
+    };
+    let mut all = knots.par_chunks(CHUNK).enumerate().map(of_chunk).reduce(Vec::new, both);
+    all.sort_unstable_by(better);
+    all
 }
 
 /// Links a knot, the first of these, which is number `first` and stands below `parent`, and all below it.
 fn link(knots: &[Knot], first: u32, parent: u32, links: &mut [Link]) {
     links[0].parent = parent;
-    let Some(root) = knots.first().filter(|_| knots.len() > CHUNK) else {
+    if knots.len() <= CHUNK {
         for (i, knot) in knots.iter().enumerate() {
             links[i].bounds = knot.bounds().into();
             if !knot.is_leaf() {
@@ -119,7 +119,8 @@ fn link(knots: &[Knot], first: u32, parent: u32, links: &mut [Link]) {
             }
         }
         return;
-    };
+    }
+    let root = &knots[0];
     let second = root.at as usize;
     (links[0].bounds, links[0].sides) = (root.bounds().into(), [first + 1, first + root.at]);
     let (first_links, second_links) = links.split_at_mut(second);
@@ -263,7 +264,7 @@ impl Links {
 
 #[cfg(test)]
 mod tests {
-    use super::super::grow::tests::{fork, leaf, leaves};
+    use super::super::knots::tests::{fork, leaf, leaves};
     use super::*;
 
     /// The areas of all boxes but those of leaves.
@@ -279,7 +280,7 @@ mod tests {
         let left = fork(fork(fork(small(0), large), small(1)), small(2));
         let knots = fork(left, fork(fork(small(3), small(4)), small(5)));
         let (improved, depth) = improve(knots.clone());
-        assert_eq!(depth, Some(super::super::tests::depth(&improved)));
+        assert_eq!(depth, Some(super::super::knots::tests::depth(&improved)));
         assert!(cost(&improved) < 0.7 * cost(&knots), "{} {}", cost(&improved), cost(&knots));
         // Checks the boxes and the links as well.
         let (mut before, mut after) = (leaves(&knots), leaves(&improved));
@@ -294,6 +295,36 @@ mod tests {
         let knots = fork(fork(small, large), fork(leaf(2, 6.0, 8.0), leaf(3, 8.0, 10.0)));
         let tried = promising(&knots).into_iter().map(|(_, knot)| knots[knot as usize]);
         assert_eq!(tried.filter(Knot::is_leaf).map(|leaf| leaf.at).next(), Some(0));
+    }
+
+    /// As many leaves as asked for, cut in the middle.
+    fn even(first: u32, leaves: u32) -> Vec<Knot> {
+        if leaves == 1 {
+            let size = (first % 7) as f32 * 0.1 + 0.1;
+            return leaf(first, first as f32, first as f32 + size);
+        }
+        fork(even(first, leaves / 2), even(first + leaves / 2, leaves - leaves / 2))
+    }
+
+    #[test]
+    fn what_is_tried_and_how_it_is_linked_does_not_depend_on_how_the_work_is_shared() {
+        let knots = even(0, 2 * CHUNK as u32 + 77);
+        let mut all = Vec::new();
+        let mut parents = vec![ROOT; knots.len()];
+        let mut sides = vec![[ROOT; 2]; knots.len()];
+        for (i, above) in (0..).zip(&knots).filter(|(_, knot)| !knot.is_leaf()) {
+            sides[i as usize] = [i + 1, i + above.at];
+            for side in sides[i as usize] {
+                parents[side as usize] = i;
+                all.push((above.area() - knots[side as usize].area() * RETURNS, side));
+            }
+        }
+        all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let tried = promising(&knots);
+        assert!(tried.len() == (knots.len() - 1) / SHARE + BATCH && tried == all[..tried.len()]);
+        let links = Links::new(knots).links;
+        assert!(links.iter().map(|link| link.parent).eq(parents));
+        assert!(links.iter().map(|link| link.sides).eq(sides));
     }
 
     #[test]

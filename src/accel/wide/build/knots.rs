@@ -1,0 +1,238 @@
+//! A binary tree as an array of knots, and while it grows.
+
+use crate::math::Vec3;
+use crate::math::aabb::Aabb;
+use bytemuck::Zeroable;
+use rayon::prelude::*;
+
+/// Pieces of no more knots are put together.
+const PIECE: usize = 256;
+
+/// A node of the binary tree. They stand in an array, each followed by all that is below it, first side first.
+#[derive(Clone, Copy, Debug, Zeroable)]
+pub(super) struct Knot {
+    pub lo: Vec3,
+    /// Of a leaf the first of its prims, in the end the packed child that it is; of another knot how many knots further on
+    /// its second side is.
+    pub at: u32,
+    pub hi: Vec3,
+    /// Prims of a leaf; 0: no leaf.
+    pub count: u32,
+}
+
+impl Knot {
+    pub(super) fn leaf(bounds: Aabb, first: u32, count: u32) -> Self {
+        Self { lo: bounds.lo, at: first, hi: bounds.hi, count }
+    }
+
+    pub(super) fn fork(bounds: Aabb, second: u32) -> Self {
+        Self { lo: bounds.lo, at: second, hi: bounds.hi, count: 0 }
+    }
+
+    #[inline]
+    pub(super) fn bounds(&self) -> Aabb {
+        Aabb { lo: self.lo, hi: self.hi }
+    }
+
+    #[inline]
+    pub(super) fn is_leaf(&self) -> bool {
+        self.count > 0
+    }
+
+    /// Half the surface of its box.
+    #[inline]
+    pub(super) fn area(&self) -> f32 {
+        let d = self.hi - self.lo;
+        d.x * d.y + d.y * d.z + d.z * d.x
+    }
+}
+
+/// A tree while it grows: its knots in their order, in pieces that are not moved until it is known how many there are.
+#[derive(Default)]
+pub(super) struct Growth {
+    pieces: Vec<Vec<Knot>>,
+    /// The last piece, which knots are added to.
+    open: Vec<Knot>,
+    /// Knots above the next one.
+    above: usize,
+    /// Knots on the longest way down.
+    depth: usize,
+}
+
+impl Growth {
+    /// Begins below so many knots.
+    fn below(above: usize) -> Self {
+        Self { above, ..Self::default() }
+    }
+
+    fn len(&self) -> usize {
+        self.pieces.iter().chain([&self.open]).map(Vec::len).sum()
+    }
+
+    /// Adds a knot over what `first` and `second` add, of which neither shares its work with another thread.
+    pub(super) fn fork(&mut self, bounds: Aabb, first: impl FnOnce(&mut Self), second: impl FnOnce(&mut Self)) {
+        let (at, pieces) = (self.open.len(), self.pieces.len());
+        self.add(Knot::fork(bounds, 0));
+        self.above += 1;
+        first(self);
+        self.open[at].at = index(self.open.len() - at);
+        second(self);
+        self.above -= 1;
+        debug_assert_eq!(pieces, self.pieces.len(), "a knot that was not shared went to another piece");
+    }
+
+    /// The same by two threads.
+    pub(super) fn fork_shared(
+        &mut self,
+        bounds: Aabb,
+        first: impl FnOnce(&mut Self) + Send,
+        second: impl FnOnce(&mut Self) + Send,
+    ) {
+        let before = self.len();
+        self.add(Knot::fork(bounds, 0));
+        self.close();
+        let last = self.pieces.len() - 1;
+        let at = self.pieces[last].len() - 1;
+        self.above += 1;
+        let mut beyond = Self::below(self.above);
+        rayon::join(|| first(self), || second(&mut beyond));
+        self.above -= 1;
+        self.pieces[last][at].at = index(self.len() - before);
+        self.close();
+        beyond.pieces.into_iter().for_each(|piece| self.put(piece));
+        self.open = beyond.open;
+        self.depth = self.depth.max(beyond.depth);
+    }
+
+    pub(super) fn add(&mut self, knot: Knot) {
+        self.depth = self.depth.max(self.above + 1);
+        self.open.push(knot);
+    }
+
+    /// Makes room for so many knots where a piece begins.
+    pub(super) fn begin(&mut self, knots: usize) {
+        if self.open.capacity() == 0 {
+            self.open.reserve(knots);
+        }
+    }
+
+    /// Ends the last piece.
+    fn close(&mut self) {
+        let piece = std::mem::take(&mut self.open);
+        self.put(piece);
+    }
+
+    /// Puts a piece behind the others.
+    fn put(&mut self, piece: Vec<Knot>) {
+        match self.pieces.last_mut() {
+            Some(last) if last.len() + piece.len() <= PIECE => last.extend(piece),
+            _ => self.pieces.push(piece),
+        }
+    }
+
+    /// All knots, and how many are on the longest way down.
+    pub(super) fn finish(mut self) -> (Vec<Knot>, usize) {
+        if self.pieces.is_empty() {
+            return (self.open, self.depth);
+        }
+        self.close();
+        // Each thread makes the pages that it writes to.
+        let mut knots = bytemuck::zeroed_vec(self.len());
+        let mut rest = &mut knots[..];
+        let places: Vec<&mut [Knot]> =
+            self.pieces.iter().map(|piece| rest.split_off_mut(..piece.len()).unwrap_or_default()).collect();
+        self.pieces.into_par_iter().zip(places).for_each(|(piece, place)| place.copy_from_slice(&piece));
+        (knots, self.depth)
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "knots are fewer than twice the prims, which loading keeps below 2³²"
+)]
+pub(super) fn index(i: usize) -> u32 {
+    i as u32
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A leaf of one prim: a cube from `lo` to `hi` on every axis.
+    pub(in super::super) fn leaf(prim: u32, lo: f32, hi: f32) -> Vec<Knot> {
+        vec![Knot::leaf(Aabb { lo: Vec3::splat(lo), hi: Vec3::splat(hi) }, prim, 1)]
+    }
+
+    /// A knot over two trees.
+    pub(in super::super) fn fork(first: Vec<Knot>, second: Vec<Knot>) -> Vec<Knot> {
+        let root = Knot::fork(first[0].bounds().union(second[0].bounds()), index(first.len() + 1));
+        [vec![root], first, second].concat()
+    }
+
+    /// The first prim of each leaf; every box is the smallest around what is below it.
+    pub(in super::super) fn leaves(knots: &[Knot]) -> Vec<u32> {
+        let root = &knots[0];
+        if root.is_leaf() {
+            assert_eq!(knots.len(), 1);
+            return vec![root.at];
+        }
+        let (first, second) = knots[1..].split_at(root.at as usize - 1);
+        assert_eq!(first[0].bounds().union(second[0].bounds()), root.bounds());
+        [leaves(first), leaves(second)].concat()
+    }
+
+    /// Knots on the longest way down.
+    pub(in super::super) fn depth(knots: &[Knot]) -> usize {
+        let (mut left, mut most) = (vec![(0, 1)], 0);
+        while let Some((i, depth)) = left.pop() {
+            let knot = &knots[i];
+            most = most.max(depth);
+            if !knot.is_leaf() {
+                left.extend([(i + knot.at as usize, depth + 1), (i + 1, depth + 1)]);
+            }
+        }
+        most
+    }
+
+    /// Adds a tree over so many leaves, of which the first has this number, cut anywhere, and shared where it has more than so
+    /// many.
+    fn grow(growth: &mut Growth, first: u32, leaves: u32, shared: u32, seed: u64) {
+        let bounds =
+            |first: u32, leaves: u32| Aabb { lo: Vec3::splat(first as f32), hi: Vec3::splat((first + leaves) as f32) };
+        if leaves == 1 {
+            return growth.add(Knot::leaf(bounds(first, 1), first, 1));
+        }
+        let mut random = crate::math::random::Random::new(seed ^ u64::from(first) << 32 ^ u64::from(leaves));
+        // Every other cut takes off a leaf alone.
+        let cut = if random.below(2) == 0 { 1 } else { 1 + random.below(leaves as usize - 1) as u32 };
+        let sides = [(first, cut), (first + cut, leaves - cut)];
+        let [a, b] = sides.map(|(first, leaves)| move |g: &mut Growth| grow(g, first, leaves, shared, seed));
+        if leaves > shared {
+            growth.fork_shared(bounds(first, leaves), a, b);
+        } else {
+            growth.begin(3);
+            growth.fork(bounds(first, leaves), a, b);
+        }
+    }
+
+    #[test]
+    fn a_tree_that_threads_share_is_the_one_that_grows_alone() {
+        for seed in 0..20 {
+            for count in [1, 2, 3, 700, 5000] {
+                let grown = |shared: u32| {
+                    let mut growth = Growth::default();
+                    grow(&mut growth, 0, count, shared, seed);
+                    growth.finish()
+                };
+                let (alone, deepest) = grown(u32::MAX);
+                assert!(leaves(&alone).into_iter().eq(0..count));
+                assert_eq!(deepest, depth(&alone));
+                for shared in [1, 40, 1000] {
+                    let (knots, depth) = grown(shared);
+                    let all = |knots: &[Knot]| knots.iter().map(|k| (k.lo, k.hi, k.at, k.count)).collect::<Vec<_>>();
+                    assert!(depth == deepest && all(&knots) == all(&alone), "{seed}: {count} shared from {shared} on");
+                }
+            }
+        }
+    }
+}
