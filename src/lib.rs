@@ -136,6 +136,7 @@ pub mod math;
 pub mod named;
 pub mod number;
 pub mod pages;
+mod parts;
 mod quiet;
 pub mod render;
 pub mod save;

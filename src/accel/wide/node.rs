@@ -6,6 +6,7 @@ use crate::math::aabb::Aabb;
 use crate::math::simd::{LANES, Row};
 use crate::math::triangles::{Corners8, NO_CORNERS};
 use crate::pages::Paged;
+use crate::parts::cut;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
@@ -178,15 +179,11 @@ impl Arrays {
     pub(super) fn new(pieces: &[Vec<Node>], depth: u32, blocks: usize, bounds: Aabb) -> Self {
         let nodes = pieces.iter().map(Vec::len).sum();
         let mut lines = Paged::zeroed(OF_NODE * nodes + OF_BLOCK * blocks);
-        let mut rest: &mut [Node] = bytemuck::cast_slice_mut(&mut lines[..OF_NODE * nodes]);
-        let mut start = 0;
-        let mut places = Vec::new();
-        for piece in pieces {
-            places.push((piece, start, rest.split_off_mut(..piece.len()).unwrap_or_default()));
-            start += index(piece.len());
-        }
-        places.into_par_iter().for_each(|(piece, start, place)| {
-            for (node, place) in piece.iter().zip(place) {
+        let places = cut(bytemuck::cast_slice_mut(&mut lines[..OF_NODE * nodes]), pieces.iter().map(Vec::len));
+        let starts = pieces.iter().scan(0, |next, piece| Some(std::mem::replace(next, *next + index(piece.len()))));
+        let starts: Vec<u32> = starts.collect();
+        places.into_par_iter().zip(pieces).zip(starts).for_each(|((places, piece), start)| {
+            for (node, place) in piece.iter().zip(places) {
                 *place = Node { children: node.children.map(|child| Child::behind(child, start)), ..*node };
             }
         });

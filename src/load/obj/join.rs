@@ -4,7 +4,7 @@ use super::chunk::{COMMENTS, Chunk, NO_COLOR, OPEN, count, resolve};
 use super::statements::Statements;
 use crate::load::geometry::{Corner, Geometry, LARGEST, NONE, Run, Soup, Stretch, Stroke};
 use crate::math::{DVec2, DVec3, Vec3};
-use bytemuck::Zeroable;
+use crate::parts::{cut, joined};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -105,11 +105,6 @@ fn triangles(chunks: &[Chunk], begins: &[Before], vertices: u32, stretches: &[St
         })
     };
     parts.into_par_iter().zip(numbers).zip(begins).all(fill).then_some(all)
-}
-
-/// Parts of so many items each, of a list that is as long as all of them.
-fn cut<T>(mut all: &mut [T], lengths: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
-    lengths.map(|length| all.split_off_mut(..length).unwrap_or_default()).collect()
 }
 
 fn check_sizes(chunks: &[Chunk]) -> Result<(), u64> {
@@ -228,23 +223,10 @@ fn painted(chunks: &[Chunk], positions: u32) -> Vec<[f32; 3]> {
 }
 
 fn vertices(chunks: &mut [Chunk]) -> (Vec<DVec3>, Vec<DVec2>, Vec<Vec3>) {
-    let positions = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.positions)));
-    let uvs = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.uvs)));
-    let normals = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.normals)));
+    let positions = joined(chunks.iter_mut().map(|c| std::mem::take(&mut c.positions)).collect());
+    let uvs = joined(chunks.iter_mut().map(|c| std::mem::take(&mut c.uvs)).collect());
+    let normals = joined(chunks.iter_mut().map(|c| std::mem::take(&mut c.normals)).collect());
     (positions, uvs, normals)
-}
-
-/// All lists as one; a single one is not copied.
-fn flat<T: Copy + Zeroable + Send + Sync>(lists: impl ExactSizeIterator<Item = Vec<T>>) -> Vec<T> {
-    let mut lists: Vec<Vec<T>> = lists.collect();
-    if lists.len() == 1 {
-        return lists.pop().unwrap_or_default();
-    }
-    // Its pages are made by the threads that write there.
-    let mut all: Vec<T> = bytemuck::zeroed_vec(lists.iter().map(Vec::len).sum());
-    let parts = cut(&mut all, lists.iter().map(Vec::len));
-    parts.into_par_iter().zip(lists).for_each(|(part, list)| part.copy_from_slice(&list));
-    all
 }
 
 /// What corners may name.

@@ -2,8 +2,8 @@
 
 use crate::math::Vec3;
 use crate::math::aabb::Aabb;
+use crate::parts::joined;
 use bytemuck::Zeroable;
-use rayon::prelude::*;
 
 /// Pieces of no more knots are put together.
 const PIECE: usize = 256;
@@ -132,17 +132,8 @@ impl Growth {
 
     /// All knots, and how many are on the longest way down.
     pub(super) fn finish(mut self) -> (Vec<Knot>, usize) {
-        if self.pieces.is_empty() {
-            return (self.open, self.depth);
-        }
         self.close();
-        // Each thread makes the pages that it writes to.
-        let mut knots = bytemuck::zeroed_vec(self.len());
-        let mut rest = &mut knots[..];
-        let places: Vec<&mut [Knot]> =
-            self.pieces.iter().map(|piece| rest.split_off_mut(..piece.len()).unwrap_or_default()).collect();
-        self.pieces.into_par_iter().zip(places).for_each(|(piece, place)| place.copy_from_slice(&piece));
-        (knots, self.depth)
+        (joined(self.pieces), self.depth)
     }
 }
 

@@ -1,8 +1,8 @@
 //! From shapes to a tree.
 //!
-//! A binary tree ([`knots`]) is grown from the root down ([`grow`]), improved where large and small faces are mixed ([`reinsert`]) and
-//! fused into nodes of eight ([`collapse`]). Its leaves become blocks. Large parts are worked on by several threads; what
-//! they make is joined in order, so that the tree does not depend on their number.
+//! A binary tree ([`knots`]) is grown from the root down ([`grow`]), improved where large and small faces are mixed
+//! ([`reinsert`]) and fused into nodes of eight ([`collapse`]). Its leaves become blocks. Large parts are worked on by several
+//! threads; what they make is joined in order, so that the tree does not depend on their number.
 //!
 //! Children stand in slots by where they are: the bit k of a slot's number is set where its child lies on the positive side
 //! of axis k, as far as the eight slots allow. `slot ^ octant` is then about the order in which a ray meets them, where
@@ -28,6 +28,7 @@ use crate::accel::Shapes;
 use crate::math::aabb::Aabb;
 use crate::math::simd::LANES;
 use crate::math::triangles::set_corners;
+use crate::parts::joined;
 
 /// Prims of a run at most: they cost more than a triangle, and are tested one by one.
 const RUN: u32 = 2;
@@ -182,10 +183,8 @@ impl Leaves {
         });
         let chunks: Vec<(&mut [Knot], [u32; 2])> = knots.chunks_mut(KNOTS).zip(starts).collect();
         let lists: Vec<Self> = chunks.into_par_iter().map(|(c, start)| Self::list_from(start, c, triangles)).collect();
-        Self {
-            blocks: lists.iter().map(|list| &list.blocks[..]).collect::<Vec<_>>().concat(),
-            runs: lists.iter().map(|list| &list.runs[..]).collect::<Vec<_>>().concat(),
-        }
+        let (blocks, runs) = lists.into_iter().map(|list| (list.blocks, list.runs)).unzip();
+        Self { blocks: joined(blocks), runs: joined(runs) }
     }
 
     /// Of some knots, before which so many blocks and runs stand.
@@ -279,9 +278,10 @@ mod tests {
         }
     }
 
-    /// Where areas are too small to be told from zero, every cut takes off as little as it can.
+    /// Where areas are too small to be told from zero, every cut takes off as little as it can: six times the levels and more
+    /// of an even tree.
     #[test]
-    fn a_tree_of_hundreds_of_levels_that_threads_share_fits_on_their_stacks() {
+    fn a_tree_that_is_far_too_deep_and_that_threads_share_fits_on_their_stacks() {
         let place = |i: i32| -1e-24 * 0.93f32.powi(i.min(700));
         let corners = |x: f32| [Vec3::new(x, 0.0, 0.0), Vec3::new(x, 1e-25, 0.0), Vec3::new(x, 0.0, 1e-25)];
         let vertices: Vec<Vec3> = (0..30_000).flat_map(|i| corners(place(i))).collect();
@@ -291,6 +291,7 @@ mod tests {
         for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
             let Binary { knots, depth: grown, .. } = pool.install(|| binary_tree(&shapes, splitting, 1));
             assert_eq!(grown, depth(&knots));
+            assert!(grown > 64, "{splitting:?}: {grown} levels are no deep tree");
             let checked = pool.install(|| Wide::build(&shapes, splitting).check());
             assert!(checked.is_ok(), "{splitting:?}, {grown} deep: {checked:?}");
         }
