@@ -6,7 +6,7 @@ use super::intersector::{IntersectorKind, Looked, MollerTrumbore, MollerTrumbore
 use super::query::{Culling, Tested};
 use super::volumes::{Ball, Volumes};
 use super::{
-    Accel, AccelParams, Bvh, GridOctree, Hit, Holes, Kept, NoProbe, Pencil, Probe, Ray, Shapes, Splitting,
+    Accel, AccelParams, Bvh, GridOctree, Hit, Holes, Kept, Looking, NoProbe, Pencil, Probe, Ray, Shapes, Splitting,
     StructureStats, Transformed, TwoLevel, Unculled, Wide,
 };
 use crate::math::aabb::Aabb;
@@ -299,6 +299,15 @@ impl Accel for AnyAccel<'_> {
         self.ask_first(Some(pencil), rays, hits, scratch, probe);
     }
 
+    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
+        assert_eq!(looking.rays.len(), hits.len(), "a hit for each ray");
+        if P::SILENT {
+            self.ask(Looks { looking, hits, probe: &mut NoProbe }, scratch);
+        } else {
+            self.ask(Looks { looking, hits, probe }, scratch);
+        }
+    }
+
     fn blocked<P: Probe>(
         &self,
         rays: &[Ray],
@@ -340,6 +349,20 @@ impl<P: Probe> Question for FirstHits<'_, P> {
             Some(pencil) => accel.closest_from(pencil, self.rays, self.hits, scratch, self.probe),
             None => accel.closest(self.rays, self.hits, scratch, self.probe),
         }
+    }
+}
+
+struct Looks<'q, P> {
+    looking: &'q Looking<'q>,
+    hits: &'q mut [Hit],
+    probe: &'q mut P,
+}
+
+impl<P: Probe> Question for Looks<'_, P> {
+    const SILENT: bool = P::SILENT;
+
+    fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
+        accel.look(self.looking, self.hits, scratch, self.probe);
     }
 }
 

@@ -1,8 +1,31 @@
-//! Prims that stop light in some places and let it through in others, for rays that ask whether anything is in their way.
+//! Prims that are there in some places and not in others, as rays ask on their way.
+
+use super::{Hit, Pencil, Ray};
 
 /// Who knows whether a prim that is not opaque stops light where a ray meets it.
 pub trait Holes {
     /// Whether prim `prim` stops all light where ray number `ray` of those that were asked meets it, within its range. A
     /// function of both alone: it may be asked more than once, in any order.
     fn stops(&self, ray: usize, prim: u32) -> bool;
+}
+
+/// Who knows where prims that are not opaque are not there, for rays that ask what they hit first.
+pub trait Gaps {
+    /// Whether ray number `ray` of those that were asked finds nothing for certain where it meets prim `prim`. Who is not sure
+    /// says no: a structure may take any hit for one, and whoever asked goes on behind it by itself. It may be asked more than
+    /// once, in any order.
+    fn is_gap(&self, ray: usize, prim: u32) -> bool;
+}
+
+/// Rays that are asked for their first hits, and pass gaps that are known.
+#[derive(Clone, Copy)]
+pub struct Looking<'w> {
+    /// The rays.
+    pub rays: &'w [Ray],
+    /// The same as a pencil, if they are one.
+    pub pencil: Option<&'w Pencil<'w>>,
+    /// The hit of each behind which it goes on, if they do.
+    pub after: Option<&'w [Hit]>,
+    /// Who knows of gaps.
+    pub gaps: &'w dyn Gaps,
 }

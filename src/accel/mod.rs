@@ -36,7 +36,7 @@ pub use auto::AccelChoice;
 pub use bvh::Bvh;
 pub use grid::mailbox::MailboxKind;
 pub use grid::{Assign, GridOctree, GridParams};
-pub use holes::Holes;
+pub use holes::{Gaps, Holes, Looking};
 pub use instances::{Kept, TwoLevel};
 pub use intersector::{Intersector, IntersectorKind};
 pub use none::Unculled;
@@ -183,6 +183,16 @@ pub trait Accel: Sync {
         probe: &mut P,
     ) {
         self.closest(rays, hits, scratch, probe);
+    }
+
+    /// The first hit of each ray, or the first behind another, but for hits with what is known to be gaps: some of these may be
+    /// passed, or none.
+    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
+        match *looking {
+            Looking { rays, after: Some(after), .. } => self.next(rays, after, hits, scratch, probe),
+            Looking { rays, pencil: Some(pencil), .. } => self.closest_from(pencil, rays, hits, scratch, probe),
+            Looking { rays, .. } => self.closest(rays, hits, scratch, probe),
+        }
     }
 
     /// Whether anything *opaque* lies in `t_min..=t_max` of each ray: prims with a bit in [`Shapes::opaque`]. In a

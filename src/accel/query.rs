@@ -6,7 +6,7 @@
 use super::intersector::{Exact, Intersector};
 use super::probe::{Outcome, Test};
 use super::wave::{ForAny, ForFirst, ForNext, Wave, begin, end};
-use super::{Accel, Hit, Holes, NO_PRIM, Pencil, Probe, Ray, Shapes};
+use super::{Accel, Hit, Holes, Looking, NO_PRIM, Pencil, Probe, Ray, Shapes};
 use crate::math::shear::RaySpace;
 use crate::math::simd::LANES;
 use crate::math::triangle::{self, Meeting, Triangle};
@@ -455,7 +455,7 @@ impl<C: Culling> Accel for C {
     }
 
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        self.trace(&mut ForFirst { rays, pencil: None, hits, test: Exact }, scratch, probe);
+        self.trace(&mut ForFirst { rays, pencil: None, gaps: None, hits, test: Exact }, scratch, probe);
     }
 
     fn closest_from<P: Probe>(
@@ -466,7 +466,16 @@ impl<C: Culling> Accel for C {
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        self.trace(&mut ForFirst { rays, pencil: Some(*pencil), hits, test: Exact }, scratch, probe);
+        self.trace(&mut ForFirst { rays, pencil: Some(*pencil), gaps: None, hits, test: Exact }, scratch, probe);
+    }
+
+    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
+        let Looking { rays, pencil, after, gaps } = *looking;
+        let (gaps, test) = (Some(gaps), Exact);
+        match after {
+            Some(after) => self.trace(&mut ForNext { rays, after, gaps, hits, test }, scratch, probe),
+            None => self.trace(&mut ForFirst { rays, pencil: pencil.copied(), gaps, hits, test }, scratch, probe),
+        }
     }
 
     fn blocked<P: Probe>(
@@ -488,7 +497,7 @@ impl<C: Culling> Accel for C {
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        self.trace(&mut ForNext { rays, after, hits, test: Exact }, scratch, probe);
+        self.trace(&mut ForNext { rays, after, gaps: None, hits, test: Exact }, scratch, probe);
     }
 }
 
@@ -514,7 +523,7 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
     }
 
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        self.structure.trace(&mut ForFirst { rays, pencil: None, hits, test: self.test }, scratch, probe);
+        self.structure.trace(&mut ForFirst { rays, pencil: None, gaps: None, hits, test: self.test }, scratch, probe);
     }
 
     fn blocked<P: Probe>(
@@ -536,6 +545,6 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        self.structure.trace(&mut ForNext { rays, after, hits, test: self.test }, scratch, probe);
+        self.structure.trace(&mut ForNext { rays, after, gaps: None, hits, test: self.test }, scratch, probe);
     }
 }

@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use super::query::{Closest, Goal, Next, Occluded, Query};
-use super::{Hit, Holes, Intersector, NO_PRIM, Probe, Ray, Shapes};
+use super::{Gaps, Hit, Holes, Intersector, NO_PRIM, Probe, Ray, Shapes};
 use crate::math::Vec3;
 use crate::math::simd::{LANES, Row};
 
@@ -80,6 +80,12 @@ pub trait Wave {
         None
     }
 
+    /// Who knows where its rays pass prims that are not there, if anybody is asked.
+    #[inline(always)]
+    fn gaps(&self) -> Option<&dyn Gaps> {
+        None
+    }
+
     /// What a ray looks for.
     fn goal(&self, i: usize) -> Self::Goal;
 
@@ -99,6 +105,7 @@ pub trait Wave {
 pub(super) struct ForFirst<'w, I> {
     pub rays: &'w [Ray],
     pub pencil: Option<Pencil<'w>>,
+    pub gaps: Option<&'w dyn Gaps>,
     pub hits: &'w mut [Hit],
     pub test: I,
 }
@@ -127,6 +134,11 @@ impl<I: Intersector> Wave for ForFirst<'_, I> {
     #[inline(always)]
     fn pencil(&self) -> Option<Pencil<'_>> {
         self.pencil
+    }
+
+    #[inline(always)]
+    fn gaps(&self) -> Option<&dyn Gaps> {
+        self.gaps
     }
 
     #[inline(always)]
@@ -192,6 +204,7 @@ impl<'w, I: Intersector> Wave for ForAny<'w, I> {
 pub(super) struct ForNext<'w, I> {
     pub rays: &'w [Ray],
     pub after: &'w [Hit],
+    pub gaps: Option<&'w dyn Gaps>,
     pub hits: &'w mut [Hit],
     pub test: I,
 }
@@ -214,6 +227,11 @@ impl<I: Intersector> Wave for ForNext<'_, I> {
         for (t_min, after) in t_min.iter_mut().zip(&self.after[start..]) {
             *t_min = t_min.max(after.t);
         }
+    }
+
+    #[inline(always)]
+    fn gaps(&self) -> Option<&dyn Gaps> {
+        self.gaps
     }
 
     #[inline(always)]

@@ -3,7 +3,7 @@
 use super::Progress;
 use super::filters::Through;
 use super::observer::{Observer, Question};
-use crate::accel::{Accel, Hit, Holes, Pencil, Ray};
+use crate::accel::{Accel, Gaps, Hit, Holes, Looking, Pencil, Ray};
 
 /// A structure, one worker's scratch for it, and whoever may end the work.
 pub(crate) struct Asking<'a, A: Accel> {
@@ -21,14 +21,14 @@ impl<'a, A: Accel> Asking<'a, A> {
 
     /// The first hit of each ray.
     pub(crate) fn closest<P: Observer>(&mut self, rays: &[Ray], hits: &mut [Hit], probe: &mut P) {
-        self.closest_of(None, rays, hits, probe);
+        self.closest_of(rays, (None, None), hits, probe);
     }
 
-    /// The same of rays that are those of a pencil, if there is one.
+    /// The same of rays that are those of a pencil, if there is one, and that may pass gaps, if anybody knows of any.
     pub(crate) fn closest_of<P: Observer>(
         &mut self,
-        pencil: Option<Pencil>,
         rays: &[Ray],
+        (pencil, gaps): (Option<Pencil>, Option<&dyn Gaps>),
         hits: &mut [Hit],
         probe: &mut P,
     ) {
@@ -38,12 +38,15 @@ impl<'a, A: Accel> Asking<'a, A> {
                 return;
             }
             probe.asked(Question::Closest, rays, &[]);
-            match pencil {
-                Some(pencil) => {
-                    let pencil = pencil.part(start..start + rays.len());
-                    self.accel.closest_from(&pencil, rays, hits, &mut self.scratch, probe);
+            let pencil = pencil.map(|pencil| pencil.part(start..start + rays.len()));
+            match (gaps, &pencil) {
+                (Some(gaps), pencil) => {
+                    let gaps = &From { gaps, start };
+                    let looking = Looking { rays, pencil: pencil.as_ref(), after: None, gaps };
+                    self.accel.look(&looking, hits, &mut self.scratch, probe);
                 }
-                None => self.accel.closest(rays, hits, &mut self.scratch, probe),
+                (None, Some(pencil)) => self.accel.closest_from(pencil, rays, hits, &mut self.scratch, probe),
+                (None, None) => self.accel.closest(rays, hits, &mut self.scratch, probe),
             }
             probe.answered(hits);
         }
@@ -73,14 +76,28 @@ impl<'a, A: Accel> Asking<'a, A> {
         }
     }
 
-    /// The first hit of each ray behind `after`.
-    pub(crate) fn next<P: Observer>(&mut self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], probe: &mut P) {
-        for ((rays, after), hits) in rays.chunks(P::SLICE).zip(after.chunks(P::SLICE)).zip(hits.chunks_mut(P::SLICE)) {
+    /// The first hit of each ray behind `after`; they may pass gaps, if anybody knows of any.
+    pub(crate) fn next<P: Observer>(
+        &mut self,
+        rays: &[Ray],
+        (after, gaps): (&[Hit], Option<&dyn Gaps>),
+        hits: &mut [Hit],
+        probe: &mut P,
+    ) {
+        let slices = rays.chunks(P::SLICE).zip(after.chunks(P::SLICE)).zip(hits.chunks_mut(P::SLICE));
+        for (start, ((rays, after), hits)) in (0..).step_by(P::SLICE).zip(slices) {
             if self.gives_up() {
                 return;
             }
             probe.asked(Question::Next, rays, after);
-            self.accel.next(rays, after, hits, &mut self.scratch, probe);
+            match gaps {
+                Some(gaps) => {
+                    let gaps = &From { gaps, start };
+                    let looking = Looking { rays, pencil: None, after: Some(after), gaps };
+                    self.accel.look(&looking, hits, &mut self.scratch, probe);
+                }
+                None => self.accel.next(rays, after, hits, &mut self.scratch, probe),
+            }
             probe.answered(hits);
         }
     }
@@ -88,5 +105,17 @@ impl<'a, A: Accel> Asking<'a, A> {
     fn gives_up(&mut self) -> bool {
         self.cancelled |= self.progress.cancelled();
         self.cancelled
+    }
+}
+
+/// What is known of rays from one on.
+struct From<'a> {
+    gaps: &'a dyn Gaps,
+    start: usize,
+}
+
+impl Gaps for From<'_> {
+    fn is_gap(&self, ray: usize, prim: u32) -> bool {
+        self.gaps.is_gap(self.start + ray, prim)
     }
 }

@@ -3,14 +3,17 @@
 use super::Settings;
 use super::absorption::Absorption;
 use super::certainty;
+use super::clearings::{Before, Clearings, Cones};
 use super::frame::sample_width;
 use super::glint;
+use super::observer::Observer;
 use super::sampling::Sampling;
 use super::shade::{Band, LocalLight, bands};
 use super::sky::Sky;
 use super::strip::Common;
 use super::texture::TextureStore;
 use super::world::World;
+use crate::accel::Ray;
 use crate::accel::shapes::Prim;
 use crate::math::Vec3;
 use crate::math::simd::LANES;
@@ -53,6 +56,8 @@ pub(crate) struct Context<'a> {
     pub common: Arc<[Option<Common>]>,
     /// Parts of the spectrum; empty unless a material disperses light.
     pub bands: Vec<Band>,
+    /// Where rays from the eye find nothing for certain.
+    pub clearings: Option<Arc<Clearings<'a>>>,
     /// Whether anything but opaque surfaces can stand before a light.
     pub has_filters: bool,
     /// How strongly the insides of materials absorb light.
@@ -148,6 +153,7 @@ impl<'a> Context<'a> {
             lights,
             common: (0..).zip(&scene.materials).map(common).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
+            clearings: (!everything).then(|| Clearings::of(scene, world, textures)).flatten().map(Arc::new),
             has_filters: everything || !world.is_opaque(),
             absorption: Absorption::of(&scene.materials, everything),
             shows_environment: scene.background == Some(Background::Environment),
@@ -156,6 +162,12 @@ impl<'a> Context<'a> {
             cutoff: settings.cutoff,
             everything,
         }
+    }
+
+    /// What rays with these cones find for certain, where whoever listens does not mind that they pass it.
+    pub(super) fn before<'r, P: Observer>(&'r self, rays: &'r [Ray], cones: Cones<'r>) -> Option<Before<'r, 'a>> {
+        let clearings = self.clearings.as_ref().filter(|_| P::PASSES_GAPS)?;
+        Some(clearings.before(rays, cones))
     }
 
     /// Whether shadow rays ask on their way what lets light through, and how much.

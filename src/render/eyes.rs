@@ -290,15 +290,15 @@ impl Eyes {
         }
     }
 
-    /// The rays, as a pencil if they are one, and room for a hit of each.
-    pub(crate) fn ask(&mut self) -> (&[Ray], Option<Pencil<'_>>, &mut [Hit]) {
-        let Self { count, rays, hits, dirs, is_pencil, .. } = self;
+    /// The rays, as a pencil if they are one, the widths and growths of their cones, and room for a hit of each.
+    pub(crate) fn ask(&mut self) -> (&[Ray], Option<Pencil<'_>>, [&[f32]; 2], &mut [Hit]) {
+        let Self { count, rays, hits, dirs, cone_width, cone_spread, is_pencil, .. } = self;
         let rays = &rays[..*count];
         // Whoever is asked writes each of them.
         hits.resize(*count, Hit::MISS);
         let first = rays.first().filter(|_| *is_pencil);
         let pencil = first.map(|ray| Pencil { origin: ray.origin, dirs: dirs.each_ref().map(|row| &row[..*count]) });
-        (rays, pencil, hits)
+        (rays, pencil, [&cone_width[..*count], &cone_spread[..*count]], hits)
     }
 
     /// Their directions by axis, and how wide their cones grow, radians.

@@ -176,6 +176,9 @@ impl<'a> Through<'a> {
 impl Holes for Through<'_> {
     fn stops(&self, number: usize, prim: u32) -> bool {
         let (context, ray) = (self.context, &self.rays[number]);
+        if context.clearings.as_ref().is_some_and(|clearings| clearings.is_clear(ray, prim, None)) {
+            return false;
+        }
         let shape = context.world.prim(prim);
         let space = RaySpace::checked(ray.origin, ray.dir).0;
         let Prim::Triangle(corners) = shape else {

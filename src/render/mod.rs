@@ -15,6 +15,7 @@ mod asking;
 mod beside;
 mod branch;
 mod by_class;
+mod clearings;
 mod certainty;
 mod context;
 mod costs;

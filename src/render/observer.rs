@@ -25,6 +25,9 @@ pub(crate) trait Observer: Probe {
     /// second. 1 where the walk's calls must be told apart by ray.
     const SLICE: usize = 256;
 
+    /// Whether rays may pass gaps that are known without a word: where nobody counts or keeps what is asked.
+    const PASSES_GAPS: bool = false;
+
     /// These rays are asked now; `after` has the hit of each behind which it goes on, where that is the question.
     fn asked(&mut self, _question: Question, _rays: &[Ray], _after: &[Hit]) {}
     /// The rays asked last have their answers: these hits, where hits were asked for.
@@ -33,7 +36,10 @@ pub(crate) trait Observer: Probe {
     fn batch(&mut self, _samples: usize) {}
 }
 
-impl Observer for NoProbe {}
+impl Observer for NoProbe {
+    const PASSES_GAPS: bool = true;
+}
+
 impl Observer for RayCounts {}
 
 /// A ray, and the hit behind which it goes on ([`Hit::MISS`] for other questions).

@@ -81,6 +81,8 @@ impl Probe for Clock {
 }
 
 impl Observer for Clock {
+    const PASSES_GAPS: bool = true;
+
     fn asked(&mut self, _question: Question, rays: &[Ray], _after: &[Hit]) {
         self.rays += rays.len() as u64;
         self.asked = Some(Instant::now());

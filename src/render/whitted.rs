@@ -12,6 +12,7 @@ use super::asking::Asking;
 use super::beside::Beside;
 use super::branch::{Ground, Point};
 use super::by_class::ByClass;
+use super::clearings::Cones;
 use super::context::{AROUND_LIMIT, Context, FOLLOWERS, SHADOW_LIMIT, coverage};
 use super::draws::{Draws, Purpose, Stream};
 use super::everything::look_up_in_vain;
@@ -26,7 +27,7 @@ use super::sky::{Arounds, Standpoint};
 use super::sobol::mix;
 use super::surface::{Surface, Target};
 use super::wave::{Crossing, Path, Queue, RayClass, Wave};
-use crate::accel::{Accel, Hit, Ray};
+use crate::accel::{Accel, Gaps, Hit, Ray};
 use crate::math::{DVec3, Vec3};
 use bytemuck::{Pod, Zeroable};
 use std::hint::black_box;
@@ -146,8 +147,12 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Traces the rays of all eyes and shades what they hit.
     fn trace_eyes(&mut self) {
         let mut eyes = std::mem::take(&mut self.eyes);
-        let (rays, pencil, hits) = eyes.ask();
-        self.asking.closest_of(pencil, rays, hits, self.counts.of(RayClass::Primary));
+        {
+            let (rays, pencil, cones, hits) = eyes.ask();
+            let before = self.context.before::<P>(rays, Cones::Eyes(cones));
+            let gaps = before.as_ref().map(|before| before as &dyn Gaps);
+            self.asking.closest_of(rays, (pencil, gaps), hits, self.counts.of(RayClass::Primary));
+        }
         if !self.asking.cancelled {
             self.shade_eyes(&eyes);
             self.trace_shadows();
@@ -164,7 +169,10 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             if !queue.is_empty() {
                 queue.take(wave, limits);
                 wave.starts = false;
-                self.asking.next(&wave.rays, &wave.after, &mut wave.hits, self.counts.of(class));
+                let Wave { rays, paths, after, hits, .. } = wave;
+                let before = self.context.before::<P>(rays, Cones::Paths(paths));
+                let gaps = before.as_ref().map(|before| before as &dyn Gaps);
+                self.asking.next(rays, (after, gaps), hits, self.counts.of(class));
                 return Some(class);
             }
         }

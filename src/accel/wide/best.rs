@@ -189,6 +189,14 @@ impl Seeker {
         if place.prim == self.exclude {
             return false;
         }
+        if !W::Goal::ANY
+            && let Some(gaps) = wave.gaps()
+            && !shapes.opaque.get_or_set(place.prim)
+            && between.is_none_or(|(low, _)| low <= self.best.high)
+            && gaps.is_gap(self.number, place.prim)
+        {
+            return false;
+        }
         match between {
             Some((low, high)) if low > self.best.high || high < self.t_min => false,
             Some((low, high)) if (low > self.t_min) & (high < self.best.low) & (high <= self.best.high) => {

@@ -176,7 +176,7 @@ mod tests {
     }
 
     fn take(level: Level, tree: &Tree, rays: &[Ray], start: usize) -> Ready {
-        level.run(Take(tree, &ForFirst { rays, pencil: None, hits: &mut [], test: Exact }, start))
+        level.run(Take(tree, &ForFirst { rays, pencil: None, gaps: None, hits: &mut [], test: Exact }, start))
     }
 
     /// The same by plain numbers, one ray after another.
@@ -263,7 +263,7 @@ mod tests {
         let after: Vec<Hit> = (0..rays.len()).map(|i| Hit { t: i as f32 * 0.25, ..Hit::MISS }).collect();
         for level in Level::all() {
             let mut hits = vec![Hit::MISS; rays.len()];
-            let wave = ForNext { rays, after: &after, hits: &mut hits, test: Exact };
+            let wave = ForNext { rays, after: &after, gaps: None, hits: &mut hits, test: Exact };
             for start in [0, LANES] {
                 let ready = level.run(Take(&tree, &wave, start));
                 for (i, lane) in (start..rays.len()).zip(0..LANES) {

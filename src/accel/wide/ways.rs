@@ -192,7 +192,7 @@ fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not_and_there
         RayOrder::of(&crate::accel::wave::ForFirst {
             rays,
             pencil: None,
-            hits: &mut hits,
+            gaps: None, hits: &mut hits,
             test: crate::accel::intersector::Exact,
         })
     };

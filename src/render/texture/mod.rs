@@ -6,10 +6,12 @@
 //!
 //! Every lookup is a pure function of the scene and its arguments: no state, no order, the same bits on every thread.
 
+mod clear;
 mod decode;
 mod places;
 mod pyramid;
 
+pub(crate) use clear::Clear;
 pub(crate) use places::{Layout, Places, Spots, changes};
 
 use crate::math::formula::floor;

@@ -22,6 +22,7 @@ use crate::math::{DMat3, DVec3, Vec3};
 use crate::scene::mesh::normal_from_object;
 use crate::scene::{Material, Scene};
 use solid::Solid;
+use std::ops::Range;
 
 /// A [`Scene`] placed for tracing. World position = `center` + position in [`Shapes`].
 #[derive(Clone, Debug)]
@@ -213,6 +214,11 @@ impl World {
         self.shapes.opaque = BitSet::filled(self.shapes.len(), false);
         self.kept.set_opaque(false);
         self
+    }
+
+    /// The prims of an instance's triangles.
+    pub(crate) fn triangles_of(&self, instance: u32) -> Range<u32> {
+        self.first_triangle[instance as usize]..self.first_triangle[instance as usize + 1]
     }
 
     /// What prim `prim` came from; of a number below [`Self::len`], others mean nothing.
