@@ -15,6 +15,17 @@ pub trait Gaps {
     /// says no: a structure may take any hit for one, and whoever asked goes on behind it by itself. It may be asked more than
     /// once, in any order.
     fn is_gap(&self, ray: usize, prim: u32) -> bool;
+
+    /// The same of the rays of a mask, of which the first is ray `first`.
+    fn gaps(&self, first: usize, rays: u32, prim: u32) -> u32 {
+        let (mut gaps, mut left) = (0, rays);
+        while left != 0 {
+            let ray = left.trailing_zeros();
+            left &= left - 1;
+            gaps |= u32::from(self.is_gap(first + ray as usize, prim)) << ray;
+        }
+        gaps
+    }
 }
 
 /// Rays that are asked for their first hits, and pass gaps that are known.

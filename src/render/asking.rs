@@ -118,4 +118,8 @@ impl Gaps for From<'_> {
     fn is_gap(&self, ray: usize, prim: u32) -> bool {
         self.gaps.is_gap(self.start + ray, prim)
     }
+
+    fn gaps(&self, first: usize, rays: u32, prim: u32) -> u32 {
+        self.gaps.gaps(self.start + first, rays, prim)
+    }
 }

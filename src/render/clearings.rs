@@ -3,11 +3,12 @@
 //! Most of what rays meet in a tree are the clear parts of its leaves. Where a map is clear all around ([`Clear`]) it need not
 //! be read, and the ray need not stop there. What is not that sure is shaded, with the same outcome.
 
-use super::patch::{Footprint, Gradients, Turn};
+use super::patch::{Gradients, Turn};
 use super::texture::{Clear, TextureStore};
 use super::wave::Path;
 use super::world::World;
 use crate::accel::{Gaps, Ray};
+use crate::math::simd::{Kernel, LANES, Level, Simd};
 use crate::math::{Vec2, Vec3};
 use crate::scene::{AlphaMode, Instance, Material, Mesh, Scene, TextureRef};
 use bytemuck::{Pod, Zeroable};
@@ -22,8 +23,9 @@ const SHARE: usize = 8;
 /// No more faces are looked at.
 const MOST: usize = 1 << 20;
 
-/// Where a ray grazes a face more than this, the cosine, nothing is known: how wide its cone is there depends on roundings.
-const GRAZING: f32 = 0.02;
+/// Where a ray goes so much farther along a face than across its cone nothing is known: how wide it is there depends on
+/// roundings.
+const GRAZING: f32 = 50.0;
 
 /// Error of a place on a face that a ray meets under a right angle, in parts of the largest number it is made from; more
 /// than all roundings.
@@ -75,7 +77,7 @@ struct Found {
 
 /// A face and how coordinates run along it.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
+#[repr(C, align(64))]
 struct Face {
     /// Outward, of unit length, and where its plane is.
     normal: Vec3,
@@ -87,6 +89,7 @@ struct Face {
     growth: f32,
     /// Its material and one; 0: nothing is known.
     material: u32,
+    unused: [u32; 2],
 }
 
 impl<'a> Clearings<'a> {
@@ -125,11 +128,19 @@ impl<'a> Clearings<'a> {
     /// Whether a ray meets prim `prim`, if it does, where nothing is for certain; of a cone, its width at the start and its
     /// growth, or of maps as sharp as they are.
     pub(super) fn is_clear(&self, ray: &Ray, prim: u32, cone: Option<[f32; 2]>) -> bool {
-        let Some(i) = prim.checked_sub(self.prims.start) else { return false };
-        let Some(Found { known, faces }) = self.find() else { return false };
-        let Some(face) = faces.get(i as usize) else { return false };
-        let known = known.get((face.material as usize).wrapping_sub(1)).and_then(Option::as_ref);
-        known.is_some_and(|known| face.is_clear(known, ray, cone))
+        self.face(prim).is_some_and(|(face, known)| {
+            face.clear(known, &Rays::new([(ray, cone.unwrap_or_default())], cone.is_some())) == 1
+        })
+    }
+
+    /// What is known of a prim.
+    #[inline]
+    fn face(&self, prim: u32) -> Option<(&Face, &Known)> {
+        let i = prim.checked_sub(self.prims.start)?;
+        let Found { known, faces } = self.find()?;
+        let face = faces.get(i as usize)?;
+        let known = known.get((face.material as usize).wrapping_sub(1))?.as_ref()?;
+        Some((face, known))
     }
 
     /// Where gaps are, once it was asked often enough.
@@ -218,39 +229,77 @@ impl Face {
         let edges = [uv[1] - uv[0], uv[2] - uv[0]];
         let along = [0, 1].map(|k: usize| second * edges[0][k] + third * edges[1][k]);
         let at = uv[0] + offset - Vec2::new(along[0].dot(a), along[1].dot(a));
-        let growth = (along[0].length_squared() + along[1].length_squared()).sqrt();
-        let face = Self { normal, place: normal.dot(a), along, at, growth, material: 0 };
+        // The longer axis of the ellipse that a unit circle becomes.
+        let (u, v, both) = (along[0].length_squared(), along[1].length_squared(), along[0].dot(along[1]));
+        let growth = (0.5 * (u + v) + (0.25 * (u - v) * (u - v) + both * both).sqrt()).sqrt();
+        let face = Self { normal, place: normal.dot(a), along, at, growth, material: 0, unused: [0; 2] };
         (growth.is_finite() && at.is_finite() && normal.is_finite()).then_some(face)
     }
 
-    /// Whether a map is clear all around where a ray meets the plane.
-    #[inline]
-    fn is_clear(&self, Known { clear, one_sided }: &Known, ray: &Ray, cone: Option<[f32; 2]>) -> bool {
-        let length = ray.dir.length();
-        let (dir, slope) = (ray.dir / length, self.normal.dot(ray.dir) / length);
-        // Backs of one-sided faces are passed, too, but as something that is there.
-        if slope.abs() < GRAZING || cone.is_some() && *one_sided && slope > 0.0 {
-            return false;
+    /// Those of some rays around which a map is clear where they meet the plane; of maps as sharp as they are where cones have
+    /// no width.
+    #[inline(always)]
+    fn clear<const N: usize>(&self, Known { clear, one_sided }: &Known, rays: &Rays<N>) -> u32 {
+        let (mut at, mut needed) = ([[0.0; N]; 2], [0.0; N]);
+        for (i, needed) in needed.iter_mut().enumerate() {
+            let [origin, dir] = [&rays.origin, &rays.dir].map(|rows| Vec3::new(rows[0][i], rows[1][i], rows[2][i]));
+            let (slope, length) = (self.normal.dot(dir), dir.length());
+            let t = (self.place - self.normal.dot(origin)) / slope;
+            let position = origin + dir * t;
+            (at[0][i], at[1][i]) =
+                (self.along[0].dot(position) + self.at.x, self.along[1].dot(position) + self.at.y);
+            let longer = length / slope.abs();
+            let [width, spread] = [rays.cone[0][i], rays.cone[1][i]];
+            let largest = origin.abs().max_element() + t.abs() * length + self.place.abs();
+            let largest_at = at[0][i].abs().max(at[1][i].abs());
+            let error = BLUR + (largest * self.growth * longer + largest_at) * ROUNDING;
+            let across = (width + spread * t) * self.growth;
+            let reach = clear.reach(across, across * longer) + error;
+            // Backs of one-sided faces are passed, too, but as something that is there.
+            let unknown = (longer > GRAZING) | (rays.looks & *one_sided & (slope > 0.0));
+            *needed = if unknown { f32::INFINITY } else { reach };
         }
-        let distance = (self.place - self.normal.dot(ray.origin)) / slope;
-        let position = ray.origin + dir * distance;
-        let at = Vec2::new(self.along[0].dot(position), self.along[1].dot(position)) + self.at;
-        let room = clear.room(at);
-        if room <= 0.0 {
-            return false;
-        }
-        let largest = ray.origin.abs().max_element() + distance.abs() + self.place.abs();
-        let error = BLUR + (largest * self.growth / slope.abs() + at.abs().max_element()) * ROUNDING;
-        let axes = match cone {
-            Some([width, spread]) => {
-                let print = Footprint::new(dir, self.normal, width + spread * (distance / length));
-                let change = |v: Vec3| Vec2::new(self.along[0].dot(v), self.along[1].dot(v));
-                [change(print.along), change(print.across)]
-            }
-            None => [Vec2::ZERO; 2],
-        };
+        let room = clear.room(&at);
         // False for what is no number.
-        clear.reach(axes) + error <= room
+        (0..N).fold(0, |clear, i| clear | u32::from(needed[i] <= room[i]) << i)
+    }
+}
+
+/// Rays in lanes.
+struct Rays<const N: usize> {
+    origin: [[f32; N]; 3],
+    dir: [[f32; N]; 3],
+    /// Widths of their cones at the start, and their growths.
+    cone: [[f32; N]; 2],
+    /// Whether they look, and see fronts alone of what is one-sided.
+    looks: bool,
+}
+
+impl<const N: usize> Rays<N> {
+    /// These rays, and their cones.
+    #[inline(always)]
+    fn new(of: [(&Ray, [f32; 2]); N], looks: bool) -> Self {
+        let mut rays = Self { origin: [[0.0; N]; 3], dir: [[0.0; N]; 3], cone: [[0.0; N]; 2], looks };
+        for (i, (ray, cone)) in of.into_iter().enumerate() {
+            for k in 0..3 {
+                (rays.origin[k][i], rays.dir[k][i]) = (ray.origin[k], ray.dir[k]);
+            }
+            (rays.cone[0][i], rays.cone[1][i]) = (cone[0], cone[1]);
+        }
+        rays
+    }
+}
+
+/// Eight rays that meet a face.
+struct Eight<'r>(&'r Face, &'r Known, Rays<LANES>);
+
+impl Kernel for Eight<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> u32 {
+        let Self(face, known, rays) = self;
+        face.clear(known, &rays)
     }
 }
 
@@ -269,14 +318,48 @@ pub(super) struct Before<'r, 'a> {
     cones: Cones<'r>,
 }
 
+impl Before<'_, '_> {
+    /// The cone around a ray; `None` where nothing is to be said: behind what was there a ray may meet the same surface again,
+    /// which matters to what comes next.
+    #[inline]
+    fn cone(&self, ray: usize) -> Option<[f32; 2]> {
+        match self.cones {
+            Cones::Eyes([width, spread]) => Some([width[ray], spread[ray]]),
+            Cones::Paths(paths) if paths[ray].crossed.is_some() => None,
+            Cones::Paths(paths) => Some([paths[ray].cone_width, paths[ray].cone_spread]),
+        }
+    }
+}
+
 impl Gaps for Before<'_, '_> {
     fn is_gap(&self, ray: usize, prim: u32) -> bool {
-        let cone = match self.cones {
-            Cones::Eyes([width, spread]) => [width[ray], spread[ray]],
-            // Behind what was there a ray may meet the same surface again, which matters to what comes next.
-            Cones::Paths(paths) if paths[ray].crossed.is_some() => return false,
-            Cones::Paths(paths) => [paths[ray].cone_width, paths[ray].cone_spread],
-        };
-        self.clearings.is_clear(&self.rays[ray], prim, Some(cone))
+        self.cone(ray).is_some_and(|cone| self.clearings.is_clear(&self.rays[ray], prim, Some(cone)))
+    }
+
+    fn gaps(&self, first: usize, rays: u32, prim: u32) -> u32 {
+        let (mut left, mut passing) = (rays, 0);
+        let Some((face, known)) = self.clearings.face(prim) else { return 0 };
+        while left != 0 {
+            // The next eight, be they neighbours or not.
+            let (mut numbers, mut count) = ([left.trailing_zeros(); LANES], 0);
+            let mut of = [(&self.rays[first + numbers[0] as usize], [0.0; 2]); LANES];
+            while left != 0 && count < LANES {
+                let number = left.trailing_zeros();
+                left &= left - 1;
+                if let Some(cone) = self.cone(first + number as usize) {
+                    (numbers[count], of[count]) = (number, (&self.rays[first + number as usize], cone));
+                    count += 1;
+                }
+            }
+            let clear = match count {
+                0 => 0,
+                1 => face.clear(known, &Rays::new([of[0]], true)),
+                _ => Level::best().run_narrow(Eight(face, known, Rays::new(of, true))),
+            };
+            for (i, number) in numbers.iter().enumerate().take(count) {
+                passing |= (clear >> i & 1) << number;
+            }
+        }
+        passing
     }
 }

@@ -26,7 +26,7 @@ use super::slabs::BoxMargins;
 use super::walk::Entry;
 use crate::accel::query::Goal;
 use crate::accel::wave::{Pencil, Wave};
-use crate::accel::{Gaps, Hit, NO_PRIM, Ray, Shapes};
+use crate::accel::{Hit, NO_PRIM, Ray, Shapes};
 use crate::math::Vec3;
 use crate::math::fan::Fan;
 use crate::math::meetings::{Meetings, Plane, meet};
@@ -437,7 +437,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             && let Some(gaps) = trip.wave.gaps()
             && !trip.shapes.opaque.get_or_set(prim)
         {
-            let gone = self.passing(gaps, prim, better);
+            let gone = gaps.gaps(self.start, better, prim);
             (better, hit) = (better & !gone, hit & !gone);
         }
         // The exact test decides about distances that may be equal, and about what lanes cannot tell.
@@ -470,19 +470,6 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             (reach.low, reach.high) = (s.load(&low), s.load(&high));
         }
         changed
-    }
-
-    /// The rays of a mask that find nothing for certain where they meet a prim.
-    #[cold]
-    #[inline(never)]
-    fn passing(&self, gaps: &dyn Gaps, prim: u32, rays: u32) -> u32 {
-        let (mut passing, mut left) = (0, rays);
-        while left != 0 {
-            let ray = left.trailing_zeros();
-            left &= left - 1;
-            passing |= u32::from(gaps.is_gap(self.start + ray as usize, prim)) << ray;
-        }
-        passing
     }
 
     /// The rays of a mask that mind being hit by a prim that is not opaque.

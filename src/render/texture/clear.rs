@@ -1,6 +1,6 @@
 //! Where a map says that nothing is there, all around: how far from each place.
 
-use super::{Sampler, TextureStore, Wrap, doublings, pixels, probes, size_of};
+use super::{MAX_PROBES, Sampler, TextureStore, Wrap, pixels, size_of};
 use crate::math::Vec2;
 use crate::math::formula::floor;
 use crate::scene::{Bitmap, Filter, Mipmaps, Pixels};
@@ -16,6 +16,9 @@ const MOST: usize = 1 << 20;
 /// them.
 const BESIDE: f32 = 1.5;
 
+/// The bits of a number that are its power of two.
+const EXPONENT: u32 = 0xff80_0000;
+
 /// More than rounding changes where steps of levels and probes are.
 const ROUNDING: f32 = 1.02;
 
@@ -28,6 +31,7 @@ pub(crate) struct Clear {
     side: f32,
     inverse: f32,
     size: Vec2,
+    per_size: Vec2,
     wrap: [Wrap; 2],
     /// Cells to the nearest one that is not clear, at most 255.
     steps: Vec<u8>,
@@ -66,6 +70,7 @@ impl Clear {
             side,
             inverse: 1.0 / side,
             size: pixels((width, height)),
+            per_size: 1.0 / pixels((width, height)),
             wrap,
             steps,
             // Where a side is not halved evenly the last level has one that is up to twice as wide, and each texel may have a
@@ -81,41 +86,47 @@ impl Clear {
         self.size
     }
 
-    /// How many texels from a place, in texels, everything is clear on both axes; 0 where that is not known.
-    #[inline]
-    pub(crate) fn room(&self, at: Vec2) -> f32 {
-        let column = self.cell(at.x, 0);
-        let row = self.cell(at.y, 1);
-        let steps = self.steps.get(row * self.cells[0] + column).copied().unwrap_or(0);
-        f32::from(steps.saturating_sub(1)) * self.side
+    /// How many texels from each place, in texels, everything is clear on both axes; 0 where that is not known.
+    #[inline(always)]
+    pub(crate) fn room<const N: usize>(&self, [x, y]: &[[f32; N]; 2]) -> [f32; N] {
+        let (columns, rows) = (self.cells_of(x, 0), self.cells_of(y, 1));
+        let mut room = [0.0; N];
+        for (i, room) in room.iter_mut().enumerate() {
+            let cell = rows[i] as usize * self.cells[0] + columns[i] as usize;
+            *room = f32::from(self.steps.get(cell).map_or(0, |steps| steps.saturating_sub(1))) * self.side;
+        }
+        room
     }
 
-    /// The cell of a coordinate, in texels, along an axis.
-    #[inline]
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the map, and the cast saturates")]
-    fn cell(&self, at: f32, axis: usize) -> usize {
-        let len = self.size[axis];
-        let inside = match self.wrap[axis] {
-            Wrap::Repeat => at - floor(at / len) * len,
-            Wrap::Mirror => {
-                let there = at - floor(at / (2.0 * len)) * (2.0 * len);
-                there.min(2.0 * len - there)
-            }
-            Wrap::Clamp => at,
-        };
-        ((inside * self.inverse).max(0.0) as usize).min(self.cells[axis] - 1)
+    /// The cells of coordinates, in texels, along an axis.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "cast as small numbers")]
+    fn cells_of<const N: usize>(&self, at: &[f32; N], axis: usize) -> [i32; N] {
+        let (len, per_len, last) = (self.size[axis], self.per_size[axis], self.cells[axis] as i32 - 1);
+        let mut inside = *at;
+        match self.wrap[axis] {
+            Wrap::Repeat => inside.iter_mut().for_each(|at| *at -= floor(*at * per_len) * len),
+            Wrap::Mirror => inside.iter_mut().for_each(|at| {
+                *at -= floor(*at * (0.5 * per_len)) * (2.0 * len);
+                *at = at.min(2.0 * len - *at);
+            }),
+            Wrap::Clamp => {}
+        }
+        let mut cells = [0; N];
+        for (cell, inside) in cells.iter_mut().zip(inside) {
+            *cell = ((inside * self.inverse) as i32).clamp(0, last);
+        }
+        cells
     }
 
-    /// How far from its place, in texels, a lookup may read whose footprint has these axes, in texels.
+    /// How far from its place, in texels, a lookup may read whose footprint has axes of no more than these lengths, in texels.
     #[inline]
-    pub(crate) fn reach(&self, [along, across]: [Vec2; 2]) -> f32 {
-        let (a, b) = (along.length(), across.length());
-        let (major, minor) = (a.max(b) * ROUNDING, a.min(b) / ROUNDING);
-        let count = if self.several { probes(major / (ROUNDING * ROUNDING), minor * (ROUNDING * ROUNDING)) } else { 1.0 };
-        let wide = major / count;
-        let level = if self.levels && wide > 1.0 { doublings(wide) + 1 } else { 0 };
-        let probing = if self.several { 0.5 * major } else { 0.0 };
-        let texel = f32::from_bits((127 + level.min(127)) << 23);
+    pub(crate) fn reach(&self, shorter: f32, longer: f32) -> f32 {
+        // What a probe covers is rounded up to a level, and the next one may be read.
+        let covered = if self.several { shorter.max(longer / MAX_PROBES) } else { longer };
+        let level = f32::from_bits((ROUNDING * covered).max(0.5).to_bits() & EXPONENT);
+        let texel = if self.levels { 2.0 * level } else { 1.0 };
+        let probing = if self.several { 0.5 * ROUNDING * longer } else { 0.0 };
         BESIDE * texel * self.spread + probing
     }
 }
