@@ -5,9 +5,9 @@
 
 use super::patch::{Gradients, Turn};
 use super::texture::{Clear, TextureStore};
-use super::wave::Path;
+use super::wave::{Path, Wave};
 use super::world::World;
-use crate::accel::{Gaps, Ray};
+use crate::accel::{Gaps, Hit, Ray};
 use crate::math::simd::{Kernel, LANES, Level, Simd};
 use crate::math::{Vec2, Vec3};
 use crate::scene::{AlphaMode, Instance, Material, Mesh, Scene, TextureRef};
@@ -30,6 +30,9 @@ const GRAZING: f32 = 50.0;
 /// Error of a place on a face that a ray meets under a right angle, in parts of the largest number it is made from; more
 /// than all roundings.
 const ROUNDING: f32 = 4e-6;
+
+/// So near, in parts of what places are computed from, a surface may be met once more.
+const NEAR: f32 = 1e-3;
 
 /// Error of coordinates, texels, beside that.
 const BLUR: f32 = 0.05;
@@ -125,12 +128,15 @@ impl<'a> Clearings<'a> {
         Before { clearings: self, rays, cones }
     }
 
-    /// Whether a ray meets prim `prim`, if it does, where nothing is for certain; of a cone, its width at the start and its
-    /// growth, or of maps as sharp as they are.
-    pub(super) fn is_clear(&self, ray: &Ray, prim: u32, cone: Option<[f32; 2]>) -> bool {
-        self.face(prim).is_some_and(|(face, known)| {
-            face.clear(known, &Rays::new([(ray, cone.unwrap_or_default())], cone.is_some())) == 1
-        })
+    /// Whether a ray meets prim `prim`, if it does, where nothing is for certain. One that looks sees the fronts of what is
+    /// one-sided alone.
+    fn is_clear(&self, sight: &Sight, looks: bool, prim: u32) -> bool {
+        self.face(prim).is_some_and(|(face, known)| face.clear(known, &Rays::new([*sight], looks)) == 1)
+    }
+
+    /// Whether a ray to a light meets prim `prim`, if it does, where nothing is for certain, of maps as sharp as they are.
+    pub(super) fn lets_through(&self, ray: &Ray, prim: u32) -> bool {
+        self.is_clear(&Sight { ray, cone: [0.0; 2], from: f32::NEG_INFINITY }, false, prim)
     }
 
     /// What is known of a prim.
@@ -256,7 +262,7 @@ impl Face {
             let across = (width + spread * t) * self.growth;
             let reach = clear.reach(across, across * longer) + error;
             // Backs of one-sided faces are passed, too, but as something that is there.
-            let unknown = (longer > GRAZING) | (rays.looks & *one_sided & (slope > 0.0));
+            let unknown = (longer > GRAZING) | (t <= rays.from[i]) | (rays.looks & *one_sided & (slope > 0.0));
             *needed = if unknown { f32::INFINITY } else { reach };
         }
         let room = clear.room(&at);
@@ -265,26 +271,38 @@ impl Face {
     }
 }
 
+/// A ray that meets faces.
+#[derive(Clone, Copy)]
+pub(super) struct Sight<'r> {
+    pub ray: &'r Ray,
+    /// Width of its cone at the start, and its growth.
+    pub cone: [f32; 2],
+    /// Where it may meet what it has crossed, or comes from, once more: up to here nothing is passed, for that matters to what
+    /// comes next.
+    pub from: f32,
+}
+
 /// Rays in lanes.
 struct Rays<const N: usize> {
     origin: [[f32; N]; 3],
     dir: [[f32; N]; 3],
     /// Widths of their cones at the start, and their growths.
     cone: [[f32; N]; 2],
+    from: [f32; N],
     /// Whether they look, and see fronts alone of what is one-sided.
     looks: bool,
 }
 
 impl<const N: usize> Rays<N> {
-    /// These rays, and their cones.
     #[inline(always)]
-    fn new(of: [(&Ray, [f32; 2]); N], looks: bool) -> Self {
-        let mut rays = Self { origin: [[0.0; N]; 3], dir: [[0.0; N]; 3], cone: [[0.0; N]; 2], looks };
-        for (i, (ray, cone)) in of.into_iter().enumerate() {
+    fn new(of: [Sight; N], looks: bool) -> Self {
+        let mut rays =
+            Self { origin: [[0.0; N]; 3], dir: [[0.0; N]; 3], cone: [[0.0; N]; 2], from: [0.0; N], looks };
+        for (i, Sight { ray, cone, from }) in of.into_iter().enumerate() {
             for k in 0..3 {
                 (rays.origin[k][i], rays.dir[k][i]) = (ray.origin[k], ray.dir[k]);
             }
-            (rays.cone[0][i], rays.cone[1][i]) = (cone[0], cone[1]);
+            (rays.cone[0][i], rays.cone[1][i], rays.from[i]) = (cone[0], cone[1], from);
         }
         rays
     }
@@ -308,7 +326,16 @@ impl Kernel for Eight<'_> {
 pub(super) enum Cones<'r> {
     /// Widths and growths.
     Eyes([&'r [f32]; 2]),
-    Paths(&'r [Path]),
+    /// What rays carry that start, and what each comes from.
+    Starting(&'r [Path], &'r [Hit]),
+    /// Or that go on.
+    Continuing(&'r [Path]),
+}
+
+impl<'r> From<&'r Wave> for Cones<'r> {
+    fn from(Wave { starts, paths, after, .. }: &'r Wave) -> Self {
+        if *starts { Self::Starting(paths, after) } else { Self::Continuing(paths) }
+    }
 }
 
 /// Rays that look for what is there.
@@ -319,21 +346,27 @@ pub(super) struct Before<'r, 'a> {
 }
 
 impl Before<'_, '_> {
-    /// The cone around a ray; `None` where nothing is to be said: behind what was there a ray may meet the same surface again,
-    /// which matters to what comes next.
+    /// A ray and its cone.
     #[inline]
-    fn cone(&self, ray: usize) -> Option<[f32; 2]> {
-        match self.cones {
-            Cones::Eyes([width, spread]) => Some([width[ray], spread[ray]]),
-            Cones::Paths(paths) if paths[ray].crossed.is_some() => None,
-            Cones::Paths(paths) => Some([paths[ray].cone_width, paths[ray].cone_spread]),
-        }
+    fn sight(&self, ray: usize) -> Sight<'_> {
+        let of = |path: &Path, before: &Hit| {
+            let Ray { origin, .. } = &self.rays[ray];
+            let near = (before.t.abs() + origin.abs().max_element()) * NEAR;
+            let from = if before.is_some() { before.t + near } else { f32::NEG_INFINITY };
+            (path.cone_width, path.cone_spread, from)
+        };
+        let (width, spread, from) = match self.cones {
+            Cones::Eyes([width, spread]) => (width[ray], spread[ray], f32::NEG_INFINITY),
+            Cones::Starting(paths, after) => of(&paths[ray], &after[ray]),
+            Cones::Continuing(paths) => of(&paths[ray], &paths[ray].crossed),
+        };
+        Sight { ray: &self.rays[ray], cone: [width, spread], from }
     }
 }
 
 impl Gaps for Before<'_, '_> {
     fn is_gap(&self, ray: usize, prim: u32) -> bool {
-        self.cone(ray).is_some_and(|cone| self.clearings.is_clear(&self.rays[ray], prim, Some(cone)))
+        self.clearings.is_clear(&self.sight(ray), true, prim)
     }
 
     fn gaps(&self, first: usize, rays: u32, prim: u32) -> u32 {
@@ -342,19 +375,16 @@ impl Gaps for Before<'_, '_> {
         while left != 0 {
             // The next eight, be they neighbours or not.
             let (mut numbers, mut count) = ([left.trailing_zeros(); LANES], 0);
-            let mut of = [(&self.rays[first + numbers[0] as usize], [0.0; 2]); LANES];
             while left != 0 && count < LANES {
-                let number = left.trailing_zeros();
+                numbers[count] = left.trailing_zeros();
                 left &= left - 1;
-                if let Some(cone) = self.cone(first + number as usize) {
-                    (numbers[count], of[count]) = (number, (&self.rays[first + number as usize], cone));
-                    count += 1;
-                }
+                count += 1;
             }
-            let clear = match count {
-                0 => 0,
-                1 => face.clear(known, &Rays::new([of[0]], true)),
-                _ => Level::best().run_narrow(Eight(face, known, Rays::new(of, true))),
+            let clear = if count == 1 {
+                face.clear(known, &Rays::new([self.sight(first + numbers[0] as usize)], true))
+            } else {
+                let rays = Rays::new(numbers.map(|number| self.sight(first + number as usize)), true);
+                Level::best().run_narrow(Eight(face, known, rays))
             };
             for (i, number) in numbers.iter().enumerate().take(count) {
                 passing |= (clear >> i & 1) << number;

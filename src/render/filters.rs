@@ -176,7 +176,7 @@ impl<'a> Through<'a> {
 impl Holes for Through<'_> {
     fn stops(&self, number: usize, prim: u32) -> bool {
         let (context, ray) = (self.context, &self.rays[number]);
-        if context.clearings.as_ref().is_some_and(|clearings| clearings.is_clear(ray, prim, None)) {
+        if context.clearings.as_ref().is_some_and(|clearings| clearings.lets_through(ray, prim)) {
             return false;
         }
         let shape = context.world.prim(prim);

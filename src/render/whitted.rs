@@ -162,26 +162,27 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
 
     /// Takes the next wave and finds its hits. Rays that go on come before rays that start a deeper generation.
     fn next_wave(&mut self) -> Option<RayClass> {
+        let class = self.take_wave()?;
+        let wave = &mut self.wave;
+        let mut hits = std::mem::take(&mut wave.hits);
+        let before = self.context.before::<P>(&wave.rays, (&*wave).into());
+        let (gaps, counts) = (before.as_ref().map(|before| before as &dyn Gaps), self.counts.of(class));
+        if wave.starts {
+            self.asking.closest_of(&wave.rays, (None, gaps), &mut hits, counts);
+        } else {
+            self.asking.next(&wave.rays, (&wave.after, gaps), &mut hits, counts);
+        }
+        wave.hits = hits;
+        Some(class)
+    }
+
+    fn take_wave(&mut self) -> Option<RayClass> {
         let wave = &mut self.wave;
         let limits = (WAVE_LIMIT, WAVE_LIMIT.min(self.context.points_at_a_time));
-        for class in RayClass::ALL {
-            let queue = &mut self.continuing[class as usize];
-            if !queue.is_empty() {
-                queue.take(wave, limits);
-                wave.starts = false;
-                let Wave { rays, paths, after, hits, .. } = wave;
-                let before = self.context.before::<P>(rays, Cones::Paths(paths));
-                let gaps = before.as_ref().map(|before| before as &dyn Gaps);
-                self.asking.next(rays, (after, gaps), hits, self.counts.of(class));
-                return Some(class);
-            }
-        }
-        for class in RayClass::ALL {
-            let queue = &mut self.starting[class as usize];
-            if !queue.is_empty() {
-                queue.take(wave, limits);
-                wave.starts = true;
-                self.asking.closest(&wave.rays, &mut wave.hits, self.counts.of(class));
+        for (starts, queues) in [(false, &mut self.continuing), (true, &mut self.starting)] {
+            if let Some(class) = RayClass::ALL.into_iter().find(|&class| !queues[class as usize].is_empty()) {
+                queues[class as usize].take(wave, limits);
+                wave.starts = starts;
                 return Some(class);
             }
         }
