@@ -1,7 +1,8 @@
-//! Gaps of materials that are cut out or blended, known without shading: rays from the eye pass them on their way.
+//! Gaps of what is cut out or blended, known without shading: rays pass them on their way.
 //!
-//! Most of what rays meet in a tree are the clear parts of its leaves. Where a map is clear all around ([`Clear`]) it need not
-//! be read, and the ray need not stop there. What is not that sure is shaded, with the same outcome.
+//! Most of what rays meet in a tree are the clear parts of its leaves. Where a map is clear as far around as a lookup may read
+//! ([`Clear`]) it need not be read, and the ray need not stop there. What is not that sure is shaded, with the same outcome: a
+//! gap is passed as if it were not there, so that pictures are the same bit by bit. Whoever counts rays hears of all of them.
 
 use super::patch::{Gradients, Turn};
 use super::texture::{Clear, TextureStore};
@@ -16,7 +17,7 @@ use std::ops::Range;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Questions before it is worth finding out where maps are clear: some, and one for so many faces.
+/// Rays that meet faces before it is worth finding out where maps are clear: some, and one for so many faces.
 const ENOUGH: usize = 1 << 12;
 const SHARE: usize = 8;
 
@@ -131,7 +132,7 @@ impl<'a> Clearings<'a> {
     /// Whether a ray meets prim `prim`, if it does, where nothing is for certain. One that looks sees the fronts of what is
     /// one-sided alone.
     fn is_clear(&self, sight: &Sight, looks: bool, prim: u32) -> bool {
-        self.face(prim).is_some_and(|(face, known)| face.clear(known, &Rays::new([*sight], looks)) == 1)
+        self.face(prim, 1).is_some_and(|(face, known)| face.clear(known, &Rays::new([*sight], looks)) == 1)
     }
 
     /// Whether a ray to a light meets prim `prim`, if it does, where nothing is for certain, of maps as sharp as they are.
@@ -139,22 +140,22 @@ impl<'a> Clearings<'a> {
         self.is_clear(&Sight { ray, cone: [0.0; 2], from: f32::NEG_INFINITY }, false, prim)
     }
 
-    /// What is known of a prim.
+    /// What is known of a prim that so many rays meet.
     #[inline]
-    fn face(&self, prim: u32) -> Option<(&Face, &Known)> {
+    fn face(&self, prim: u32, rays: usize) -> Option<(&Face, &Known)> {
         let i = prim.checked_sub(self.prims.start)?;
-        let Found { known, faces } = self.find()?;
+        let Found { known, faces } = self.find(rays)?;
         let face = faces.get(i as usize)?;
         let known = known.get((face.material as usize).wrapping_sub(1))?.as_ref()?;
         Some((face, known))
     }
 
-    /// Where gaps are, once it was asked often enough.
-    fn find(&self) -> Option<&Found> {
+    /// Where gaps are, once it was asked of enough rays, of which these are some.
+    fn find(&self, rays: usize) -> Option<&Found> {
         if let Some(found) = self.found.get() {
             return Some(found);
         }
-        let asked = self.asked.fetch_add(1, Ordering::Relaxed);
+        let asked = self.asked.fetch_add(rays, Ordering::Relaxed);
         if asked < ENOUGH + self.count / SHARE || self.taken.swap(true, Ordering::Relaxed) {
             return None;
         }
@@ -169,7 +170,9 @@ impl<'a> Clearings<'a> {
         };
         let known: Vec<Option<Known>> = self.cuts.iter().map(of_cut).collect();
         // What nothing is written to takes no memory.
-        let mut faces: Vec<Face> = bytemuck::zeroed_vec(self.prims.len());
+        let Ok(mut faces) = bytemuck::try_zeroed_vec::<Face>(self.prims.len()) else {
+            return Found { known, faces: Vec::new() };
+        };
         for (instance, placed) in (0..).zip(&scene.instances) {
             let mesh = &scene.meshes[placed.mesh as usize];
             let (Some(cut), Some(known)) = (self.cuts[mesh.material as usize], &known[mesh.material as usize]) else {
@@ -252,8 +255,7 @@ impl Face {
             let (slope, length) = (self.normal.dot(dir), dir.length());
             let t = (self.place - self.normal.dot(origin)) / slope;
             let position = origin + dir * t;
-            (at[0][i], at[1][i]) =
-                (self.along[0].dot(position) + self.at.x, self.along[1].dot(position) + self.at.y);
+            (at[0][i], at[1][i]) = (self.along[0].dot(position) + self.at.x, self.along[1].dot(position) + self.at.y);
             let longer = length / slope.abs();
             let [width, spread] = [rays.cone[0][i], rays.cone[1][i]];
             let largest = origin.abs().max_element() + t.abs() * length + self.place.abs();
@@ -273,13 +275,13 @@ impl Face {
 
 /// A ray that meets faces.
 #[derive(Clone, Copy)]
-pub(super) struct Sight<'r> {
-    pub ray: &'r Ray,
+struct Sight<'r> {
+    ray: &'r Ray,
     /// Width of its cone at the start, and its growth.
-    pub cone: [f32; 2],
+    cone: [f32; 2],
     /// Where it may meet what it has crossed, or comes from, once more: up to here nothing is passed, for that matters to what
     /// comes next.
-    pub from: f32,
+    from: f32,
 }
 
 /// Rays in lanes.
@@ -296,8 +298,7 @@ struct Rays<const N: usize> {
 impl<const N: usize> Rays<N> {
     #[inline(always)]
     fn new(of: [Sight; N], looks: bool) -> Self {
-        let mut rays =
-            Self { origin: [[0.0; N]; 3], dir: [[0.0; N]; 3], cone: [[0.0; N]; 2], from: [0.0; N], looks };
+        let mut rays = Self { origin: [[0.0; N]; 3], dir: [[0.0; N]; 3], cone: [[0.0; N]; 2], from: [0.0; N], looks };
         for (i, Sight { ray, cone, from }) in of.into_iter().enumerate() {
             for k in 0..3 {
                 (rays.origin[k][i], rays.dir[k][i]) = (ray.origin[k], ray.dir[k]);
@@ -371,7 +372,7 @@ impl Gaps for Before<'_, '_> {
 
     fn gaps(&self, first: usize, rays: u32, prim: u32) -> u32 {
         let (mut left, mut passing) = (rays, 0);
-        let Some((face, known)) = self.clearings.face(prim) else { return 0 };
+        let Some((face, known)) = self.clearings.face(prim, rays.count_ones() as usize) else { return 0 };
         while left != 0 {
             // The next eight, be they neighbours or not.
             let (mut numbers, mut count) = ([left.trailing_zeros(); LANES], 0);

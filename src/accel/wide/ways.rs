@@ -5,7 +5,7 @@ use super::flight::{DEPTH, FARTHEST_FIRST};
 use super::{ASKED, MANY, RayOrder, Splitting, Wide};
 use crate::accel::tests::Sieve;
 use crate::accel::tests::scenes::{self, ray};
-use crate::accel::{Accel, Hit, NoProbe, Pencil, Ray, Shapes, Unculled};
+use crate::accel::{Accel, Gaps, Hit, Looking, NoProbe, Pencil, Ray, Shapes, Unculled};
 use crate::math::Vec3;
 use crate::math::random::Random;
 use crate::math::simd::{Level, WIDE};
@@ -175,6 +175,58 @@ fn crowds_of_a_pencil_hit_what_brute_force_hits() {
     }
 }
 
+/// Rays find nothing where they meet some of what is not opaque.
+struct Lattice<'s>(&'s Shapes);
+
+impl Gaps for Lattice<'_> {
+    fn is_gap(&self, ray: usize, prim: u32) -> bool {
+        assert!(!self.0.opaque.get_or_set(prim), "nobody asks of what is opaque");
+        !(ray + prim as usize * 5).is_multiple_of(4)
+    }
+}
+
+/// What rays are said to hit is what they hit behind gaps alone; how many hits were passed.
+fn passed(shapes: &Shapes, wide: &Wide, rays: &[Ray], after: Option<&[Hit]>, what: &str) -> usize {
+    let (brute, gaps) = (Unculled::new(shapes), Lattice(shapes));
+    let (mut hits, mut count) = (vec![Hit::MISS; rays.len()], 0);
+    let looking = Looking { rays, pencil: None, after, gaps: &gaps };
+    wide.look(&looking, &mut hits, &mut wide.scratch(), &mut NoProbe);
+    for (i, (ray, hit)) in rays.iter().zip(&hits).enumerate() {
+        let (mut before, mut met) = (after.map_or(Hit::BEFORE_ALL, |after| after[i]), [Hit::MISS]);
+        loop {
+            brute.next(&[*ray], &[before], &mut met, &mut brute.scratch(), &mut NoProbe);
+            if met[0].bits() == hit.bits() {
+                break;
+            }
+            let is_gap = met[0].is_some() && !shapes.opaque.get_or_set(met[0].prim) && gaps.is_gap(i, met[0].prim);
+            assert!(is_gap, "{what}: ray {i} hits {hit:?} and passes {:?}", met[0]);
+            (before, count) = (met[0], count + 1);
+        }
+    }
+    count
+}
+
+#[test]
+fn rays_that_pass_gaps_hit_what_lies_behind_them() {
+    let mut all = [0; WAYS.len()];
+    for (name, shapes) in scenes::all() {
+        let alone = scenes::rays(&shapes, 4);
+        let beside = side_by_side(&alone, 32);
+        for level in Level::all() {
+            for (way, all) in WAYS.into_iter().zip(&mut all) {
+                let wide = Wide::build(&shapes, Splitting::SurfaceArea).at_level(level).with_rays(way);
+                let what = format!("{name}: {way:?} on {}", level.name());
+                for rays in [&alone, &beside] {
+                    *all += passed(&shapes, &wide, rays, None, &what);
+                    let first = first_hits(&wide, rays);
+                    *all += passed(&shapes, &wide, rays, Some(&first), &what);
+                }
+            }
+        }
+    }
+    assert!(all.iter().all(|&count| count > 100), "{all:?}");
+}
+
 #[test]
 fn a_wave_may_be_of_any_length() {
     let shapes = scenes::soup(60, 0.4);
@@ -192,7 +244,8 @@ fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not_and_there
         RayOrder::of(&crate::accel::wave::ForFirst {
             rays,
             pencil: None,
-            gaps: None, hits: &mut hits,
+            gaps: None,
+            hits: &mut hits,
             test: crate::accel::intersector::Exact,
         })
     };

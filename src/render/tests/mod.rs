@@ -3,6 +3,7 @@
 mod around;
 mod bits;
 mod costs;
+mod gaps;
 mod glass;
 mod glints;
 mod gloss;

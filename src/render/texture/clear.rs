@@ -1,6 +1,6 @@
 //! Where a map says that nothing is there, all around: how far from each place.
 
-use super::{MAX_PROBES, Sampler, TextureStore, Wrap, pixels, size_of};
+use super::{MAX_PROBES, Sampler, TextureStore, Wrap, doublings, pixels, size_of};
 use crate::math::Vec2;
 use crate::math::formula::floor;
 use crate::scene::{Bitmap, Filter, Mipmaps, Pixels};
@@ -16,8 +16,8 @@ const MOST: usize = 1 << 20;
 /// them.
 const BESIDE: f32 = 1.5;
 
-/// The bits of a number that are its power of two.
-const EXPONENT: u32 = 0xff80_0000;
+/// Beyond these levels nothing is said.
+const LEVELS: usize = 16;
 
 /// More than rounding changes where steps of levels and probes are.
 const ROUNDING: f32 = 1.02;
@@ -35,8 +35,8 @@ pub(crate) struct Clear {
     wrap: [Wrap; 2],
     /// Cells to the nearest one that is not clear, at most 255.
     steps: Vec<u8>,
-    /// Texels of a smaller copy cover no more than so many of the widths that its level says.
-    spread: f32,
+    /// How far from its place, in texels, a lookup in a level reads.
+    reach: [f32; LEVELS],
     /// Whether there are smaller copies, and whether several probes may be taken.
     levels: bool,
     several: bool,
@@ -63,7 +63,6 @@ impl Clear {
             return None;
         }
         let steps = steps(cells, wrap, &filled(bitmap, (channel, most), side, cells)?);
-        let even = width.is_power_of_two() && height.is_power_of_two();
         let side = pixels((side, side)).x;
         Some(Self {
             cells,
@@ -73,9 +72,7 @@ impl Clear {
             per_size: 1.0 / pixels((width, height)),
             wrap,
             steps,
-            // Where a side is not halved evenly the last level has one that is up to twice as wide, and each texel may have a
-            // part of one more of those below.
-            spread: if even { 1.0 } else { 3.0 },
+            reach: std::array::from_fn(|level| reach(width, level).max(reach(height, level))),
             levels: mipmaps != Mipmaps::None,
             several: minify == Filter::Linear,
         })
@@ -124,11 +121,22 @@ impl Clear {
     pub(crate) fn reach(&self, shorter: f32, longer: f32) -> f32 {
         // What a probe covers is rounded up to a level, and the next one may be read.
         let covered = if self.several { shorter.max(longer / MAX_PROBES) } else { longer };
-        let level = f32::from_bits((ROUNDING * covered).max(0.5).to_bits() & EXPONENT);
-        let texel = if self.levels { 2.0 * level } else { 1.0 };
+        let level = if self.levels { doublings(2.0 * ROUNDING * covered) as usize } else { 0 };
         let probing = if self.several { 0.5 * ROUNDING * longer } else { 0.0 };
-        BESIDE * texel * self.spread + probing
+        self.reach[level.min(LEVELS - 1)] + probing
     }
+}
+
+/// How far from its place a lookup in a level reads along a side of so many texels; infinite in the last that is told of.
+fn reach(len: usize, level: usize) -> f32 {
+    if level == LEVELS - 1 {
+        return f32::INFINITY;
+    }
+    // Where a side is not halved evenly texels are wider than two of those below, and have a part of one more on each side.
+    let side = |level: usize| (len >> level).max(1);
+    let width = |level: usize| pixels((len, 0)).x / pixels((side(level), 0)).x;
+    let more = (0..level).filter(|&below| side(below) != 2 * side(below + 1)).map(width);
+    BESIDE * width(level) + more.sum::<f32>()
 }
 
 /// Which cells have anything in them, of so many texels a side; `None` if all have.
@@ -137,9 +145,7 @@ fn filled(bitmap: &Bitmap, (channel, most): (usize, u8), side: usize, cells: [us
         Pixels::Rgb8(_) if channel == 3 => return None,
         Pixels::Rgb8(texels) => cells_with(texels.as_chunks::<3>().0, |t| t[channel] > most, (bitmap, side, cells)),
         Pixels::Rgba8(texels) => cells_with(texels, |t| t[channel] > most, (bitmap, side, cells)),
-        Pixels::Rgba16(texels) => {
-            cells_with(texels, |t| t[channel] > u16::from(most) * 257, (bitmap, side, cells))
-        }
+        Pixels::Rgba16(texels) => cells_with(texels, |t| t[channel] > u16::from(most) * 257, (bitmap, side, cells)),
     };
     filled.contains(&false).then_some(filled)
 }
@@ -169,8 +175,7 @@ fn steps([columns, rows]: [usize; 2], wrap: [Wrap; 2], filled: &[bool]) -> Vec<u
         if let Some(from) = from {
             let other = &steps[from * columns..][..columns];
             beside[1..=columns].copy_from_slice(other);
-            (beside[0], beside[columns + 1]) =
-                if around { (other[columns - 1], other[0]) } else { (u8::MAX, u8::MAX) };
+            (beside[0], beside[columns + 1]) = if around { (other[columns - 1], other[0]) } else { (u8::MAX, u8::MAX) };
         } else {
             beside.fill(u8::MAX);
         }
@@ -202,5 +207,122 @@ fn steps([columns, rows]: [usize; 2], wrap: [Wrap; 2], filled: &[bool]) -> Vec<u
         if steps == known {
             return steps;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ColorSpace;
+    use super::*;
+    use crate::math::random::Random;
+    use crate::scene::{Scene, Texture};
+
+    const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
+
+    /// Steps by their definition.
+    fn defined([columns, rows]: [usize; 2], wrap: [Wrap; 2], filled: &[bool]) -> Vec<u8> {
+        let apart = |a: usize, b: usize, len: usize, wrap: Wrap| {
+            let apart = a.abs_diff(b);
+            if wrap == Wrap::Repeat { apart.min(len - apart) } else { apart }
+        };
+        let of = |cell: usize| {
+            let steps = |other: usize| {
+                let [x, y] = [(cell % columns, other % columns), (cell / columns, other / columns)];
+                apart(x.0, x.1, columns, wrap[0]).max(apart(y.0, y.1, rows, wrap[1]))
+            };
+            let nearest = (0..filled.len()).filter(|&other| filled[other]).map(steps).min();
+            nearest.map_or(u8::MAX, |steps| steps.min(255) as u8)
+        };
+        (0..filled.len()).map(of).collect()
+    }
+
+    #[test]
+    fn steps_lead_to_the_nearest_cell_that_is_filled_also_across_borders() {
+        let mut random = Random::new(3);
+        for cells in [[1, 1], [7, 5], [13, 1], [1, 9], [16, 11], [300, 1]] {
+            for wrap in WRAPS.map(|u| WRAPS.map(|v| [u, v])).as_flattened() {
+                for part in [0.0, 0.01, 0.05, 0.5, 1.0] {
+                    let filled: Vec<bool> = (0..cells[0] * cells[1]).map(|_| random.unit() < part).collect();
+                    assert_eq!(steps(cells, *wrap, &filled), defined(cells, *wrap, &filled), "{cells:?} {wrap:?}");
+                }
+            }
+        }
+    }
+
+    /// A map with spots of alpha on it, the other codes up to `most`.
+    fn spotted(random: &mut Random, (width, height): (u32, u32), most: u8, sampler: Sampler) -> Scene {
+        let mut texels = vec![[200, 100, 50, 0]; (width * height) as usize];
+        texels.iter_mut().for_each(|texel| texel[3] = random.below(usize::from(most) + 1) as u8);
+        for _ in 0..3 {
+            let (x, y) = (random.below(width as usize) as u32, random.below(height as usize) as u32);
+            for k in 0..4 {
+                let (x, y) = ((x + k % 2).min(width - 1), (y + k / 2).min(height - 1));
+                texels[(y * width + x) as usize][3] = 255;
+            }
+        }
+        let pixels = Pixels::Rgba8(texels.into_iter().collect());
+        let bitmap = Bitmap { name: String::new(), width, height, pixels };
+        Scene { textures: vec![Texture { bitmap: 0, sampler }], bitmaps: vec![bitmap], ..Scene::default() }
+    }
+
+    #[test]
+    fn what_is_clear_all_around_is_read_as_no_more_than_what_is_stored_there() {
+        let mut random = Random::new(12);
+        let (mut clear_ones, mut all) = (0, 0);
+        for (round, size) in [(64, 64), (128, 32), (37, 50), (100, 64), (1024, 8), (2048, 16), (33, 1)]
+            .into_iter()
+            .cycle()
+            .take(84)
+            .enumerate()
+        {
+            let filter = |k: usize| if k.is_multiple_of(3) { Filter::Nearest } else { Filter::Linear };
+            let sampler = Sampler {
+                magnify: filter(round + 1),
+                minify: filter(round + 2),
+                mipmaps: [Mipmaps::Linear, Mipmaps::Linear, Mipmaps::Nearest, Mipmaps::None][round % 4],
+                wrap_u: WRAPS[round % 3],
+                wrap_v: WRAPS[round / 3 % 3],
+                ..Sampler::default()
+            };
+            let most = [0, 100][round % 2];
+            let scene = spotted(&mut random, size, most, sampler);
+            let store = TextureStore::new(&scene);
+            let clear = Clear::of(&store, 0, 3, most).unwrap();
+            for _ in 0..3000 {
+                let at = Vec2::new(random.unit() * 3.0 - 1.0, random.unit() * 3.0 - 1.0);
+                // From far below a texel to many, round or long, in any direction.
+                let longer = libm::exp2f(random.unit() * 8.0 - 3.0);
+                let shorter = longer * libm::exp2f(-4.0 * random.unit());
+                let (sin, cos) = libm::sincosf(random.unit() * 7.0);
+                let texels = clear.size();
+                let axes = [Vec2::new(cos, sin) * longer / texels, Vec2::new(-sin, cos) * shorter / texels];
+                let room = clear.room(&[[at.x * texels.x], [at.y * texels.y]])[0];
+                all += 1;
+                if clear.reach(shorter, longer) <= room {
+                    clear_ones += 1;
+                    let read = store.sample(0, ColorSpace::SrgbCutOut, at, axes[0], axes[1]).w;
+                    let least = f32::from(most) / 255.0 + 1e-3;
+                    assert!(read <= least && (most > 0 || read == 0.0), "{size:?} {sampler:?} {at} {axes:?}: {read}");
+                    let sharp = store.channel::<3>(0, at);
+                    assert!(sharp <= least, "{size:?} {sampler:?} {at}: {sharp}");
+                }
+            }
+        }
+        assert!(clear_ones > all / 5, "{clear_ones} of {all}");
+    }
+
+    #[test]
+    fn maps_without_alpha_or_without_a_gap_are_clear_nowhere() {
+        let of = |pixels: Pixels, channel: usize| {
+            let bitmap = Bitmap { name: String::new(), width: 4, height: 4, pixels };
+            let texture = Texture { bitmap: 0, sampler: Sampler::default() };
+            let scene = Scene { textures: vec![texture], bitmaps: vec![bitmap], ..Scene::default() };
+            Clear::of(&TextureStore::new(&scene), 0, channel, 0).is_some()
+        };
+        let rgb = |code: u8| Pixels::Rgb8((0..48).map(|_| code).collect());
+        assert!(!of(rgb(0), 3) && of(rgb(0), 0) && !of(rgb(1), 0));
+        let rgba16 = |code: u16| Pixels::Rgba16((0..16).map(|_| [9, 9, 9, code]).collect());
+        assert!(of(rgba16(0), 3) && !of(rgba16(1), 3) && !of(rgba16(0), 1));
+        assert!(Clear::of(&TextureStore::new(&Scene::default()), 0, 3, 0).is_none());
     }
 }

@@ -1,0 +1,78 @@
+//! Rays pass what is known to be a gap, and pictures are the same bit by bit.
+
+use super::*;
+use crate::math::Vec2;
+use crate::math::random::Random;
+use crate::render::profile::render_profiled;
+use crate::scene::{AlphaMode, Bitmap, Environment, Pixels, Sampler, Texture, TextureRef, UvTransform, Wrap};
+
+/// Cards with spots on them, thick as leaves before a mirror and beside a lamp: some turn their backs, some are mirrored, some
+/// stand in one place, some are painted twice, and their maps repeat, end, or are turned.
+fn canopy(alpha_mode: AlphaMode, side: u32) -> Stage {
+    let mut random = Random::new(41);
+    let view = View::look_at(DVec3::new(0.5, 0.3, 7.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.6));
+    let mut s = stage(view);
+    s.settings = Settings { width: 132, height: 108, samples: 2, depth: Some(2), layers: true, ..s.settings };
+    s.scene.environment = Environment::Studio;
+    s.lamp(DVec3::new(4.0, 5.0, 9.0), 1.0);
+    let mirror = Phong { mirror: Vec3::splat(0.6), ..phong() };
+    s.square(-3.0, 3.0, material(Vec3::splat(0.3), mirror));
+    let spots: Vec<Vec2> = (0..4).map(|_| Vec2::new(random.unit(), random.unit())).collect();
+    let texel = |x: u32, y: u32| {
+        let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) / side as f32;
+        let near = spots.iter().map(|spot| (at - *spot).length()).fold(9.0, f32::min);
+        // Solid, then less and less, then nothing.
+        [60, 140, 40, (255.0 * (1.5 - near * 16.0)).clamp(0.0, 255.0) as u8]
+    };
+    let texels = (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
+    s.scene.bitmaps.push(Bitmap { name: String::new(), width: side, height: side, pixels: Pixels::Rgba8(texels) });
+    for (wrap_u, wrap_v) in [(Wrap::Repeat, Wrap::Repeat), (Wrap::Clamp, Wrap::Mirror)] {
+        s.scene.textures.push(Texture { bitmap: 0, sampler: Sampler { wrap_u, wrap_v, ..Sampler::default() } });
+    }
+    for i in 0..160_u32 {
+        let turn = UvTransform { rotation: 0.3 * (i % 3) as f32, scale: Vec2::new(1.0, 1.3), ..UvTransform::default() };
+        let transform = if i.is_multiple_of(2) { turn } else { UvTransform::default() };
+        let map = TextureRef { texture: i / 2 % 2, uv_set: 0, transform };
+        let leaf = Material {
+            alpha_mode,
+            base_color_map: Some(map),
+            double_sided: !i.is_multiple_of(3),
+            opacity: if i % 7 == 5 { 0.9 } else { 1.0 },
+            ..material(Vec3::ONE, phong())
+        };
+        let mut mesh = square(0.0, 0.45);
+        mesh.uvs = vec![mesh.positions.iter().map(|p| p.truncate() * [1.1, 1.9][i as usize % 2]).collect()];
+        if i % 11 == 4 {
+            mesh.colors = vec![glam::Vec4::new(1.0, 0.8, 0.7, 0.6); 4];
+        }
+        let at = random.cube().as_dvec3() * 1.6;
+        let (a, b) = (f64::from(random.unit()) * 6.0, f64::from(random.unit()) * 6.0);
+        let mirrored = DAffine3::from_scale(DVec3::new(if i % 5 == 2 { -1.0 } else { 1.0 }, 1.0, 1.0));
+        let place = DAffine3::from_translation(at) * DAffine3::from_rotation_y(a) * DAffine3::from_rotation_x(b);
+        s.mesh(mesh.clone(), place * mirrored, leaf.clone());
+        if i % 9 == 0 {
+            s.mesh(mesh, place * mirrored, leaf);
+        }
+    }
+    s
+}
+
+#[test]
+fn pictures_have_the_same_bits_whether_or_not_rays_stop_at_what_is_not_there() {
+    for alpha_mode in [AlphaMode::Mask { cutoff: 0.5 }, AlphaMode::Mask { cutoff: 0.05 }, AlphaMode::Blend] {
+        for side in [64, 90] {
+            let s = canopy(alpha_mode, side);
+            for kind in [AccelKind::FastBvh, AccelKind::Grid] {
+                let (counted, (rendered, profile)) =
+                    s.with_job(kind, |job| (render_counted(job, &()), render_profiled(job, &())));
+                assert!(rendered.picture == counted.picture, "{alpha_mode:?} {side} {kind}");
+                let counts = [counted.counts.primary, counted.counts.reflected, counted.counts.refracted];
+                let all = counts.map(|c| c.queries).iter().sum::<u64>();
+                let asked = profile.rays[0] + profile.rays[2] + profile.rays[3];
+                let passes = kind == AccelKind::FastBvh;
+                let what = format!("{alpha_mode:?} {side} {kind}: {asked} of {all}");
+                assert!(if passes { asked * 20 < all * 19 } else { asked == all }, "{what}");
+            }
+        }
+    }
+}
