@@ -28,6 +28,17 @@ pub(crate) struct Eyes {
     inside: Media,
 }
 
+/// Rays that ask for their first hits.
+pub(crate) struct Asks<'e> {
+    pub rays: &'e [Ray],
+    /// The same, if they are one.
+    pub pencil: Option<Pencil<'e>>,
+    /// Widths and growths of the cones around them.
+    pub cones: [&'e [f32]; 2],
+    /// Room for a hit of each.
+    pub hits: &'e mut [Hit],
+}
+
 /// A lens with an opening: what is not at its focus is blurred.
 ///
 /// R. L. Cook, T. Porter, L. Carpenter, "Distributed Ray Tracing" (1984). Uniform sampling has one point of the lens for
@@ -290,15 +301,15 @@ impl Eyes {
         }
     }
 
-    /// The rays, as a pencil if they are one, the widths and growths of their cones, and room for a hit of each.
-    pub(crate) fn ask(&mut self) -> (&[Ray], Option<Pencil<'_>>, [&[f32]; 2], &mut [Hit]) {
+    /// What is asked of all of them.
+    pub(crate) fn ask(&mut self) -> Asks<'_> {
         let Self { count, rays, hits, dirs, cone_width, cone_spread, is_pencil, .. } = self;
         let rays = &rays[..*count];
         // Whoever is asked writes each of them.
         hits.resize(*count, Hit::MISS);
         let first = rays.first().filter(|_| *is_pencil);
         let pencil = first.map(|ray| Pencil { origin: ray.origin, dirs: dirs.each_ref().map(|row| &row[..*count]) });
-        (rays, pencil, [&cone_width[..*count], &cone_spread[..*count]], hits)
+        Asks { rays, pencil, cones: [&cone_width[..*count], &cone_spread[..*count]], hits }
     }
 
     /// Their directions by axis, and how wide their cones grow, radians.

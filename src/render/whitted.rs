@@ -16,7 +16,7 @@ use super::clearings::Cones;
 use super::context::{AROUND_LIMIT, Context, FOLLOWERS, SHADOW_LIMIT, coverage};
 use super::draws::{Draws, Purpose, Stream};
 use super::everything::look_up_in_vain;
-use super::eyes::Eyes;
+use super::eyes::{Asks, Eyes};
 use super::glint;
 use super::layers::FirstSurface;
 use super::observer::Observer;
@@ -148,7 +148,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     fn trace_eyes(&mut self) {
         let mut eyes = std::mem::take(&mut self.eyes);
         {
-            let (rays, pencil, cones, hits) = eyes.ask();
+            let Asks { rays, pencil, cones, hits } = eyes.ask();
             let before = self.context.before::<P>(rays, Cones::Eyes(cones));
             let gaps = before.as_ref().map(|before| before as &dyn Gaps);
             self.asking.closest_of(rays, (pencil, gaps), hits, self.counts.of(RayClass::Primary));

@@ -282,7 +282,6 @@ mod tests {
                 mipmaps: [Mipmaps::Linear, Mipmaps::Linear, Mipmaps::Nearest, Mipmaps::None][round % 4],
                 wrap_u: WRAPS[round % 3],
                 wrap_v: WRAPS[round / 3 % 3],
-                ..Sampler::default()
             };
             let most = [0, 100][round % 2];
             let scene = spotted(&mut random, size, most, sampler);
