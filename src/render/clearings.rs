@@ -17,9 +17,11 @@ use std::ops::Range;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Rays that meet faces before it is worth finding out where maps are clear: some, and one for so many faces.
+/// Rays that meet faces before it is worth finding out where maps are clear: some, and one for so many faces, and for so many
+/// texels.
 const ENOUGH: usize = 1 << 12;
-const SHARE: usize = 8;
+const FACES: usize = 8;
+const TEXELS: usize = 1 << 10;
 
 /// No more faces are looked at.
 const MOST: usize = 1 << 20;
@@ -46,9 +48,10 @@ pub(crate) struct Clearings<'a> {
     textures: &'a TextureStore<'a>,
     /// By material: what cuts it out.
     cuts: Vec<Option<Cut<'a>>>,
-    /// Faces of such materials, and the prims among which they are.
-    count: usize,
+    /// The prims among which the faces of such materials are.
     prims: Range<u32>,
+    /// So many rays must have met them before it is worth finding out where gaps are.
+    enough: usize,
     asked: AtomicUsize,
     taken: AtomicBool,
     found: OnceLock<Found>,
@@ -64,17 +67,10 @@ struct Cut<'a> {
     one_sided: bool,
 }
 
-/// What is known of a material.
-#[derive(Debug)]
-struct Known {
-    clear: Clear,
-    one_sided: bool,
-}
-
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Found {
-    /// By material.
-    known: Vec<Option<Known>>,
+    /// Where each map is clear, however many materials share it.
+    maps: Vec<Option<Clear>>,
     /// By prim, from the first of them on.
     faces: Vec<Face>,
 }
@@ -91,9 +87,11 @@ struct Face {
     at: Vec2,
     /// How fast they grow at most.
     growth: f32,
-    /// Its material and one; 0: nothing is known.
-    material: u32,
-    unused: [u32; 2],
+    /// The number of its map, from 1 on; 0: nothing is known.
+    map: u32,
+    /// 1 where it is seen from its front alone.
+    one_sided: u32,
+    unused: u32,
 }
 
 impl<'a> Clearings<'a> {
@@ -110,14 +108,19 @@ impl<'a> Clearings<'a> {
         };
         let all: Vec<Range<u32>> = (0..).zip(&scene.instances).filter_map(of_instance).collect();
         let (first, last) = (all.first()?.start, all.last()?.end);
-        let count = all.iter().map(Range::len).sum();
-        (count > 0 && count <= MOST).then(|| Self {
+        let count = all.iter().map(Range::len).sum::<usize>();
+        let mut maps: Vec<u32> = cuts.iter().flatten().map(|cut| cut.map.texture).collect();
+        maps.sort_unstable();
+        maps.dedup();
+        let texels = maps.into_iter().map(|map| textures.size(map)).map(|size| (size.x * size.y) as usize);
+        let enough = ENOUGH + count / FACES + texels.sum::<usize>() / TEXELS;
+        (count <= MOST).then(|| Self {
             scene,
             world,
             textures,
             cuts,
-            count,
             prims: first..last,
+            enough,
             asked: AtomicUsize::new(0),
             taken: AtomicBool::new(false),
             found: OnceLock::new(),
@@ -132,7 +135,7 @@ impl<'a> Clearings<'a> {
     /// Whether a ray meets prim `prim`, if it does, where nothing is for certain. One that looks sees the fronts of what is
     /// one-sided alone.
     fn is_clear(&self, sight: &Sight, looks: bool, prim: u32) -> bool {
-        self.face(prim, 1).is_some_and(|(face, known)| face.clear(known, &Rays::new([*sight], looks)) == 1)
+        self.face(prim, 1).is_some_and(|(face, map)| face.clear(map, &Rays::new([*sight], looks)) == 1)
     }
 
     /// Whether a ray to a light meets prim `prim`, if it does, where nothing is for certain, of maps as sharp as they are.
@@ -140,14 +143,14 @@ impl<'a> Clearings<'a> {
         self.is_clear(&Sight { ray, cone: [0.0; 2], from: f32::NEG_INFINITY }, false, prim)
     }
 
-    /// What is known of a prim that so many rays meet.
+    /// What is known of a prim that so many rays meet, and its map.
     #[inline]
-    fn face(&self, prim: u32, rays: usize) -> Option<(&Face, &Known)> {
+    fn face(&self, prim: u32, rays: usize) -> Option<(&Face, &Clear)> {
         let i = prim.checked_sub(self.prims.start)?;
-        let Found { known, faces } = self.find(rays)?;
+        let Found { maps, faces } = self.find(rays)?;
         let face = faces.get(i as usize)?;
-        let known = known.get((face.material as usize).wrapping_sub(1))?.as_ref()?;
-        Some((face, known))
+        let map = maps.get((face.map as usize).checked_sub(1)?)?.as_ref()?;
+        Some((face, map))
     }
 
     /// Where gaps are, once it was asked of enough rays, of which these are some.
@@ -156,7 +159,7 @@ impl<'a> Clearings<'a> {
             return Some(found);
         }
         let asked = self.asked.fetch_add(rays, Ordering::Relaxed);
-        if asked < ENOUGH + self.count / SHARE || self.taken.swap(true, Ordering::Relaxed) {
+        if asked < self.enough || self.taken.swap(true, Ordering::Relaxed) {
             return None;
         }
         Some(self.found.get_or_init(|| self.survey()))
@@ -164,31 +167,32 @@ impl<'a> Clearings<'a> {
 
     fn survey(&self) -> Found {
         let Self { scene, world, textures, .. } = self;
-        let of_cut = |cut: &Option<Cut>| {
-            let Cut { map, channel, most, one_sided } = (*cut)?;
-            Some(Known { clear: Clear::of(textures, map.texture, channel, most)?, one_sided })
-        };
-        let known: Vec<Option<Known>> = self.cuts.iter().map(of_cut).collect();
         // What nothing is written to takes no memory.
-        let Ok(mut faces) = bytemuck::try_zeroed_vec::<Face>(self.prims.len()) else {
-            return Found { known, faces: Vec::new() };
-        };
+        let Ok(mut faces) = bytemuck::try_zeroed_vec::<Face>(self.prims.len()) else { return Found::default() };
+        let (mut said, mut maps) = (Vec::new(), Vec::new());
         for (instance, placed) in (0..).zip(&scene.instances) {
             let mesh = &scene.meshes[placed.mesh as usize];
-            let (Some(cut), Some(known)) = (self.cuts[mesh.material as usize], &known[mesh.material as usize]) else {
-                continue;
-            };
+            let Some(cut) = self.cuts[mesh.material as usize] else { continue };
             let Some(uvs) = cut.coordinates(mesh) else { continue };
-            let (turn, size) = (Turn::new(&cut.map.transform), known.clear.size());
+            let what = (cut.map.texture, cut.channel, cut.most);
+            let map = said.iter().position(|known| *known == what).unwrap_or_else(|| {
+                said.push(what);
+                maps.push(Clear::of(textures, cut.map.texture, cut.channel, cut.most));
+                maps.len() - 1
+            });
+            let Some(clear) = &maps[map] else { continue };
+            let (turn, size) = (Turn::new(&cut.map.transform), clear.size());
             let outward = if world.placement(instance).mirrored { -1.0 } else { 1.0 };
             for (prim, corners) in world.triangles_of(instance).zip(&mesh.triangles) {
                 let uv = corners.map(|i| uvs.get(i as usize).map_or(Vec2::NAN, |&uv| turn.apply(uv)) * size);
-                if let Some(face) = Face::new(world.triangle(prim), uv, cut.map.transform.offset * size, outward) {
-                    faces[(prim - self.prims.start) as usize] = Face { material: mesh.material + 1, ..face };
+                let face = Face::new(world.triangle(prim), uv, cut.map.transform.offset * size, outward);
+                if let Some(face) = face {
+                    let (map, one_sided) = (map as u32 + 1, u32::from(cut.one_sided));
+                    faces[(prim - self.prims.start) as usize] = Face { map, one_sided, ..face };
                 }
             }
         }
-        Found { known, faces }
+        Found { maps, faces }
     }
 }
 
@@ -241,14 +245,15 @@ impl Face {
         // The longer axis of the ellipse that a unit circle becomes.
         let (u, v, both) = (along[0].length_squared(), along[1].length_squared(), along[0].dot(along[1]));
         let growth = (0.5 * (u + v) + (0.25 * (u - v) * (u - v) + both * both).sqrt()).sqrt();
-        let face = Self { normal, place: normal.dot(a), along, at, growth, material: 0, unused: [0; 2] };
+        let face = Self { normal, place: normal.dot(a), along, at, growth, map: 0, one_sided: 0, unused: 0 };
         (growth.is_finite() && at.is_finite() && normal.is_finite()).then_some(face)
     }
 
     /// Those of some rays around which a map is clear where they meet the plane; of maps as sharp as they are where cones have
     /// no width.
     #[inline(always)]
-    fn clear<const N: usize>(&self, Known { clear, one_sided }: &Known, rays: &Rays<N>) -> u32 {
+    fn clear<const N: usize>(&self, map: &Clear, rays: &Rays<N>) -> u32 {
+        let backs_count = rays.looks & (self.one_sided == 1);
         let (mut at, mut needed) = ([[0.0; N]; 2], [0.0; N]);
         for (i, needed) in needed.iter_mut().enumerate() {
             let [origin, dir] = [&rays.origin, &rays.dir].map(|rows| Vec3::new(rows[0][i], rows[1][i], rows[2][i]));
@@ -262,12 +267,12 @@ impl Face {
             let largest_at = at[0][i].abs().max(at[1][i].abs());
             let error = BLUR + (largest * self.growth * longer + largest_at) * ROUNDING;
             let across = (width + spread * t) * self.growth;
-            let reach = clear.reach(across, across * longer) + error;
+            let reach = map.reach(across, across * longer) + error;
             // Backs of one-sided faces are passed, too, but as something that is there.
-            let unknown = (longer > GRAZING) | (t <= rays.from[i]) | (rays.looks & *one_sided & (slope > 0.0));
+            let unknown = (longer > GRAZING) | (t <= rays.from[i]) | (backs_count & (slope > 0.0));
             *needed = if unknown { f32::INFINITY } else { reach };
         }
-        let room = clear.room(&at);
+        let room = map.room(&at);
         // False for what is no number.
         (0..N).fold(0, |clear, i| clear | u32::from(needed[i] <= room[i]) << i)
     }
@@ -310,15 +315,15 @@ impl<const N: usize> Rays<N> {
 }
 
 /// Eight rays that meet a face.
-struct Eight<'r>(&'r Face, &'r Known, Rays<LANES>);
+struct Eight<'r>(&'r Face, &'r Clear, Rays<LANES>);
 
 impl Kernel for Eight<'_> {
     type Output = u32;
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) -> u32 {
-        let Self(face, known, rays) = self;
-        face.clear(known, &rays)
+        let Self(face, map, rays) = self;
+        face.clear(map, &rays)
     }
 }
 
@@ -372,7 +377,7 @@ impl Gaps for Before<'_, '_> {
 
     fn gaps(&self, first: usize, rays: u32, prim: u32) -> u32 {
         let (mut left, mut passing) = (rays, 0);
-        let Some((face, known)) = self.clearings.face(prim, rays.count_ones() as usize) else { return 0 };
+        let Some((face, map)) = self.clearings.face(prim, rays.count_ones() as usize) else { return 0 };
         while left != 0 {
             // The next eight, be they neighbours or not.
             let (mut numbers, mut count) = ([left.trailing_zeros(); LANES], 0);
@@ -382,10 +387,10 @@ impl Gaps for Before<'_, '_> {
                 count += 1;
             }
             let clear = if count == 1 {
-                face.clear(known, &Rays::new([self.sight(first + numbers[0] as usize)], true))
+                face.clear(map, &Rays::new([self.sight(first + numbers[0] as usize)], true))
             } else {
                 let rays = Rays::new(numbers.map(|number| self.sight(first + number as usize)), true);
-                Level::best().run_narrow(Eight(face, known, rays))
+                Level::best().run_narrow(Eight(face, map, rays))
             };
             for (i, number) in numbers.iter().enumerate().take(count) {
                 passing |= (clear >> i & 1) << number;

@@ -189,18 +189,13 @@ impl Seeker {
         if place.prim == self.exclude {
             return false;
         }
-        if !W::Goal::ANY
-            && let Some(gaps) = wave.gaps()
-            && !shapes.opaque.get_or_set(place.prim)
-            && between.is_none_or(|(low, _)| low <= self.best.high)
-            && gaps.is_gap(self.number, place.prim)
-        {
-            return false;
-        }
         match between {
             Some((low, high)) if low > self.best.high || high < self.t_min => false,
             Some((low, high)) if (low > self.t_min) & (high < self.best.low) & (high <= self.best.high) => {
                 if W::Goal::ANY && !wave.goal(self.number).minds(shapes.opaque.get_or_set(place.prim), place.prim) {
+                    return false;
+                }
+                if !W::Goal::ANY && wave.gaps().is_some() && passes(shapes, wave, self.number, place.prim) {
                     return false;
                 }
                 self.best = Best { low, high, place };
@@ -215,6 +210,13 @@ impl Seeker {
             },
         }
     }
+}
+
+/// Whether a ray passes a prim that it meets, as one that is not there.
+#[cold]
+#[inline(never)]
+fn passes<W: Wave>(shapes: &Shapes, wave: &W, i: usize, prim: u32) -> bool {
+    !shapes.opaque.get_or_set(prim) && wave.gaps().is_some_and(|gaps| gaps.is_gap(i, prim))
 }
 
 /// Whether a triangle is hit before the best one so far, which was found by intervals, by the exact test; `certain`: it is on

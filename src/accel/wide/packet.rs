@@ -432,12 +432,8 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let (mut hit, unsure) = (verdicts.hit & rays, verdicts.unsure & rays);
         let t_min = s.load(&self.rays.t_min);
         let mut better = s.less(t_min, low) & s.less(high, reach.low) & s.at_most(high, reach.high) & hit;
-        if !W::Goal::ANY
-            && better != 0
-            && let Some(gaps) = trip.wave.gaps()
-            && !trip.shapes.opaque.get_or_set(prim)
-        {
-            let gone = gaps.gaps(self.start, better, prim);
+        if !W::Goal::ANY && better != 0 && trip.wave.gaps().is_some() {
+            let gone = self.passing(trip.shapes, trip.wave, prim, better);
             (better, hit) = (better & !gone, hit & !gone);
         }
         // The exact test decides about distances that may be equal, and about what lanes cannot tell.
@@ -470,6 +466,14 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             (reach.low, reach.high) = (s.load(&low), s.load(&high));
         }
         changed
+    }
+
+    /// The rays of a mask that pass a prim that they meet, as one that is not there.
+    #[cold]
+    #[inline(never)]
+    fn passing<W: Wave>(&self, shapes: &Shapes, wave: &W, prim: u32, rays: u32) -> u32 {
+        let open = !shapes.opaque.get_or_set(prim);
+        wave.gaps().filter(|_| open).map_or(0, |gaps| gaps.gaps(self.start, rays, prim))
     }
 
     /// The rays of a mask that mind being hit by a prim that is not opaque.
