@@ -186,7 +186,7 @@ pub trait Accel: Sync {
     }
 
     /// The first hit of each ray, or the first behind another, but for hits with what is known to be gaps: some of these may be
-    /// passed, or none.
+    /// passed, or none. Rays that go on are those of no pencil.
     fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
         match *looking {
             Looking { rays, after: Some(after), .. } => self.next(rays, after, hits, scratch, probe),

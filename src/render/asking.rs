@@ -41,7 +41,7 @@ impl<'a, A: Accel> Asking<'a, A> {
             let pencil = pencil.map(|pencil| pencil.part(start..start + rays.len()));
             match (gaps, &pencil) {
                 (Some(gaps), pencil) => {
-                    let gaps = &From { gaps, start };
+                    let gaps = &Since { gaps, start };
                     let looking = Looking { rays, pencil: pencil.as_ref(), after: None, gaps };
                     self.accel.look(&looking, hits, &mut self.scratch, probe);
                 }
@@ -92,7 +92,7 @@ impl<'a, A: Accel> Asking<'a, A> {
             probe.asked(Question::Next, rays, after);
             match gaps {
                 Some(gaps) => {
-                    let gaps = &From { gaps, start };
+                    let gaps = &Since { gaps, start };
                     let looking = Looking { rays, pencil: None, after: Some(after), gaps };
                     self.accel.look(&looking, hits, &mut self.scratch, probe);
                 }
@@ -109,12 +109,12 @@ impl<'a, A: Accel> Asking<'a, A> {
 }
 
 /// What is known of rays from one on.
-struct From<'a> {
+struct Since<'a> {
     gaps: &'a dyn Gaps,
     start: usize,
 }
 
-impl Gaps for From<'_> {
+impl Gaps for Since<'_> {
     fn is_gap(&self, ray: usize, prim: u32) -> bool {
         self.gaps.is_gap(self.start + ray, prim)
     }

@@ -4,18 +4,18 @@
 //! ([`Clear`]) it need not be read, and the ray need not stop there. What is not that sure is shaded, with the same outcome: a
 //! gap is passed as if it were not there, so that pictures are the same bit by bit. Whoever counts rays hears of all of them.
 
-use super::patch::{Gradients, Turn};
+use super::patch::Turn;
 use super::texture::{Clear, TextureStore};
 use super::wave::{Path, Wave};
 use super::world::World;
 use crate::accel::{Gaps, Hit, Ray};
 use crate::math::simd::{Kernel, LANES, Level, Simd};
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec2, DVec3, Vec2, Vec3};
 use crate::scene::{AlphaMode, Instance, Material, Mesh, Scene, TextureRef};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Rays that meet faces before it is worth finding out where maps are clear: some, and one for so many faces, and for so many
 /// texels.
@@ -34,6 +34,9 @@ const GRAZING: f32 = 50.0;
 /// than all roundings.
 const ROUNDING: f32 = 4e-6;
 
+/// Nothing is known of a triangle with this part of the area of one of the same edges, or less.
+const SLENDER: f64 = 500.0;
+
 /// So near, in parts of what places are computed from, a surface may be met once more.
 const NEAR: f32 = 1e-3;
 
@@ -48,8 +51,9 @@ pub(crate) struct Clearings<'a> {
     textures: &'a TextureStore<'a>,
     /// By material: what cuts it out.
     cuts: Vec<Option<Cut<'a>>>,
-    /// The prims among which the faces of such materials are.
-    prims: Range<u32>,
+    /// The prims that are faces of such materials, in order, and how many come before each of these runs.
+    runs: Vec<(Range<u32>, usize)>,
+    count: usize,
     /// So many rays must have met them before it is worth finding out where gaps are.
     enough: usize,
     asked: AtomicUsize,
@@ -69,9 +73,9 @@ struct Cut<'a> {
 
 #[derive(Debug, Default)]
 struct Found {
-    /// Where each map is clear, however many materials share it.
-    maps: Vec<Option<Clear>>,
-    /// By prim, from the first of them on.
+    /// Where each map is clear.
+    maps: Vec<Arc<Option<Clear>>>,
+    /// In the order of their prims.
     faces: Vec<Face>,
 }
 
@@ -91,7 +95,8 @@ struct Face {
     map: u32,
     /// 1 where it is seen from its front alone.
     one_sided: u32,
-    unused: u32,
+    /// Error of coordinates, texels, by the sizes of the numbers that they are made from.
+    error: f32,
 }
 
 impl<'a> Clearings<'a> {
@@ -106,20 +111,27 @@ impl<'a> Clearings<'a> {
             cuts[mesh.material as usize]?.coordinates(mesh)?;
             Some(world.triangles_of(i)).filter(|prims| !prims.is_empty())
         };
-        let all: Vec<Range<u32>> = (0..).zip(&scene.instances).filter_map(of_instance).collect();
-        let (first, last) = (all.first()?.start, all.last()?.end);
-        let count = all.iter().map(Range::len).sum::<usize>();
+        let (mut runs, mut count): (Vec<(Range<u32>, usize)>, _) = (Vec::new(), 0);
+        for prims in (0..).zip(&scene.instances).filter_map(of_instance) {
+            let more = prims.len();
+            match runs.last_mut() {
+                Some((last, _)) if last.end == prims.start => last.end = prims.end,
+                _ => runs.push((prims, count)),
+            }
+            count += more;
+        }
         let mut maps: Vec<u32> = cuts.iter().flatten().map(|cut| cut.map.texture).collect();
         maps.sort_unstable();
         maps.dedup();
         let texels = maps.into_iter().map(|map| textures.size(map)).map(|size| (size.x * size.y) as usize);
         let enough = ENOUGH + count / FACES + texels.sum::<usize>() / TEXELS;
-        (count <= MOST).then(|| Self {
+        (count > 0 && count <= MOST).then(|| Self {
             scene,
             world,
             textures,
             cuts,
-            prims: first..last,
+            runs,
+            count,
             enough,
             asked: AtomicUsize::new(0),
             taken: AtomicBool::new(false),
@@ -146,10 +158,10 @@ impl<'a> Clearings<'a> {
     /// What is known of a prim that so many rays meet, and its map.
     #[inline]
     fn face(&self, prim: u32, rays: usize) -> Option<(&Face, &Clear)> {
-        let i = prim.checked_sub(self.prims.start)?;
         let Found { maps, faces } = self.find(rays)?;
-        let face = faces.get(i as usize)?;
-        let map = maps.get((face.map as usize).checked_sub(1)?)?.as_ref()?;
+        let (run, before) = self.runs.get(self.runs.partition_point(|(run, _)| run.end <= prim))?;
+        let face = faces.get(before + prim.checked_sub(run.start)? as usize)?;
+        let map = (**maps.get((face.map as usize).checked_sub(1)?)?).as_ref()?;
         Some((face, map))
     }
 
@@ -158,8 +170,10 @@ impl<'a> Clearings<'a> {
         if let Some(found) = self.found.get() {
             return Some(found);
         }
-        let asked = self.asked.fetch_add(rays, Ordering::Relaxed);
-        if asked < self.enough || self.taken.swap(true, Ordering::Relaxed) {
+        if self.taken.load(Ordering::Relaxed)
+            || self.asked.fetch_add(rays, Ordering::Relaxed) < self.enough
+            || self.taken.swap(true, Ordering::Relaxed)
+        {
             return None;
         }
         Some(self.found.get_or_init(|| self.survey()))
@@ -167,29 +181,24 @@ impl<'a> Clearings<'a> {
 
     fn survey(&self) -> Found {
         let Self { scene, world, textures, .. } = self;
-        // What nothing is written to takes no memory.
-        let Ok(mut faces) = bytemuck::try_zeroed_vec::<Face>(self.prims.len()) else { return Found::default() };
-        let (mut said, mut maps) = (Vec::new(), Vec::new());
+        let (mut faces, mut known, mut maps) = (Vec::with_capacity(self.count), Vec::new(), Vec::new());
         for (instance, placed) in (0..).zip(&scene.instances) {
             let mesh = &scene.meshes[placed.mesh as usize];
             let Some(cut) = self.cuts[mesh.material as usize] else { continue };
             let Some(uvs) = cut.coordinates(mesh) else { continue };
             let what = (cut.map.texture, cut.channel, cut.most);
-            let map = said.iter().position(|known| *known == what).unwrap_or_else(|| {
-                said.push(what);
-                maps.push(Clear::of(textures, cut.map.texture, cut.channel, cut.most));
+            let map = known.iter().position(|known| *known == what).unwrap_or_else(|| {
+                known.push(what);
+                maps.push(textures.clear(cut.map.texture, cut.channel, cut.most));
                 maps.len() - 1
             });
-            let Some(clear) = &maps[map] else { continue };
-            let (turn, size) = (Turn::new(&cut.map.transform), clear.size());
+            let (map, one_sided) = (map as u32 + 1, u32::from(cut.one_sided));
+            let (turn, size) = (Turn::new(&cut.map.transform), textures.size(cut.map.texture));
             let outward = if world.placement(instance).mirrored { -1.0 } else { 1.0 };
             for (prim, corners) in world.triangles_of(instance).zip(&mesh.triangles) {
                 let uv = corners.map(|i| uvs.get(i as usize).map_or(Vec2::NAN, |&uv| turn.apply(uv)) * size);
                 let face = Face::new(world.triangle(prim), uv, cut.map.transform.offset * size, outward);
-                if let Some(face) = face {
-                    let (map, one_sided) = (map as u32 + 1, u32::from(cut.one_sided));
-                    faces[(prim - self.prims.start) as usize] = Face { map, one_sided, ..face };
-                }
+                faces.push(face.map_or(Face::zeroed(), |face| Face { map, one_sided, ..face }));
             }
         }
         Found { maps, faces }
@@ -199,7 +208,8 @@ impl<'a> Clearings<'a> {
 impl<'a> Cut<'a> {
     fn of(material: &'a Material) -> Option<Self> {
         let most = most(material)?;
-        if material.reflection.transmits() {
+        let is_number = material.opacity.is_finite() && material.base_color.is_finite();
+        if material.reflection.transmits() || !is_number {
             return None;
         }
         // Each says so by itself, whatever the other says.
@@ -232,21 +242,47 @@ fn most(material: &Material) -> Option<u8> {
     }
 }
 
+#[expect(clippy::cast_possible_truncation, reason = "what is too large becomes infinite, and is not used")]
+fn narrow(x: f64) -> f32 {
+    x as f32
+}
+
 impl Face {
     /// That of a triangle with these coordinates, texels, at its corners, to which an offset is added; `None` where they tell
     /// nothing of use.
     fn new(corners: [Vec3; 3], uv: [Vec2; 3], offset: Vec2, outward: f32) -> Option<Self> {
-        let [a, b, c] = corners;
-        let normal = (b - a).cross(c - a).try_normalize()? * outward;
-        let Gradients { second, third } = Gradients::new(corners);
-        let edges = [uv[1] - uv[0], uv[2] - uv[0]];
+        let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+        let (e1, e2) = (b - a, c - a);
+        let normal = e1.cross(e2);
+        let twice = normal.length();
+        // Of slivers rounding makes too much.
+        if e1.length() * e2.length() > twice * SLENDER {
+            return None;
+        }
+        let (second, third) = (e2.cross(normal) / (twice * twice), normal.cross(e1) / (twice * twice));
+        let [first, of_second, of_third] = uv.map(|uv| uv.as_dvec2());
+        let edges = [of_second - first, of_third - first];
         let along = [0, 1].map(|k: usize| second * edges[0][k] + third * edges[1][k]);
-        let at = uv[0] + offset - Vec2::new(along[0].dot(a), along[1].dot(a));
+        let at = first + offset.as_dvec2() - DVec2::new(along[0].dot(a), along[1].dot(a));
         // The longer axis of the ellipse that a unit circle becomes.
         let (u, v, both) = (along[0].length_squared(), along[1].length_squared(), along[0].dot(along[1]));
         let growth = (0.5 * (u + v) + (0.25 * (u - v) * (u - v) + both * both).sqrt()).sqrt();
-        let face = Self { normal, place: normal.dot(a), along, at, growth, map: 0, one_sided: 0, unused: 0 };
-        (growth.is_finite() && at.is_finite() && normal.is_finite()).then_some(face)
+        let largest = |v: [DVec3; 3]| v.into_iter().map(|v| v.abs().max_element()).fold(0.0, f64::max);
+        let coordinates = uv.map(|uv| uv.as_dvec2().extend(0.0));
+        let error = growth * largest([a, b, c]) + largest(coordinates) + offset.as_dvec2().abs().max_element();
+        let normal = normal / twice * f64::from(outward);
+        let face = Self {
+            normal: normal.as_vec3(),
+            place: narrow(normal.dot(a)),
+            along: along.map(|along| along.as_vec3()),
+            at: at.as_vec2(),
+            growth: narrow(growth),
+            map: 0,
+            one_sided: 0,
+            error: narrow(error) * ROUNDING,
+        };
+        let is_known = face.growth > 0.0 && (face.growth + face.error + face.place).is_finite();
+        (is_known && face.at.is_finite() && face.normal.is_finite()).then_some(face)
     }
 
     /// Those of some rays around which a map is clear where they meet the plane; of maps as sharp as they are where cones have
@@ -265,7 +301,7 @@ impl Face {
             let [width, spread] = [rays.cone[0][i], rays.cone[1][i]];
             let largest = origin.abs().max_element() + t.abs() * length + self.place.abs();
             let largest_at = at[0][i].abs().max(at[1][i].abs());
-            let error = BLUR + (largest * self.growth * longer + largest_at) * ROUNDING;
+            let error = BLUR + self.error + (largest * self.growth * longer + largest_at) * ROUNDING;
             let across = (width + spread * t) * self.growth;
             let reach = map.reach(across, across * longer) + error;
             // Backs of one-sided faces are passed, too, but as something that is there.

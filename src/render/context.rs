@@ -12,6 +12,7 @@ use super::shade::{Band, LocalLight, bands};
 use super::sky::Sky;
 use super::strip::Common;
 use super::texture::TextureStore;
+use super::wave::RayClass;
 use super::world::World;
 use crate::accel::Ray;
 use crate::accel::shapes::Prim;
@@ -56,7 +57,7 @@ pub(crate) struct Context<'a> {
     pub common: Arc<[Option<Common>]>,
     /// Parts of the spectrum; empty unless a material disperses light.
     pub bands: Vec<Band>,
-    /// Where rays from the eye find nothing for certain.
+    /// Where rays find nothing for certain.
     pub clearings: Option<Arc<Clearings<'a>>>,
     /// Whether anything but opaque surfaces can stand before a light.
     pub has_filters: bool,
@@ -164,9 +165,19 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// What rays with these cones find for certain, where whoever listens does not mind that they pass it.
-    pub(super) fn before<'r, P: Observer>(&'r self, rays: &'r [Ray], cones: Cones<'r>) -> Option<Before<'r, 'a>> {
-        let clearings = self.clearings.as_ref().filter(|_| P::PASSES_GAPS)?;
+    /// What rays of a class with these cones find for certain, where whoever listens does not mind that they pass it.
+    ///
+    /// What a sample gathers is added in the order of its rays, which must not depend on where these pass gaps, and so on how
+    /// many wait: so they do where each of so many samples has one ray alone, or no more wait in the end than go together.
+    pub(super) fn before<'r, P: Observer>(
+        &'r self,
+        (class, samples): (RayClass, usize),
+        rays: &'r [Ray],
+        cones: Cones<'r>,
+    ) -> Option<Before<'r, 'a>> {
+        let each = 2 * self.gloss.rays as usize + self.bands.len() + 2;
+        let in_order = self.depth == 0 || class == RayClass::Primary && samples.saturating_mul(each) < FOLLOWERS;
+        let clearings = self.clearings.as_ref().filter(|_| P::PASSES_GAPS && in_order)?;
         Some(clearings.before(rays, cones))
     }
 

@@ -149,7 +149,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let mut eyes = std::mem::take(&mut self.eyes);
         {
             let Asks { rays, pencil, cones, hits } = eyes.ask();
-            let before = self.context.before::<P>(rays, Cones::Eyes(cones));
+            let of = (RayClass::Primary, self.samples.len());
+            let before = self.context.before::<P>(of, rays, Cones::Eyes(cones));
             let gaps = before.as_ref().map(|before| before as &dyn Gaps);
             self.asking.closest_of(rays, (pencil, gaps), hits, self.counts.of(RayClass::Primary));
         }
@@ -165,7 +166,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let class = self.take_wave()?;
         let wave = &mut self.wave;
         let mut hits = std::mem::take(&mut wave.hits);
-        let before = self.context.before::<P>(&wave.rays, (&*wave).into());
+        let before = self.context.before::<P>((class, self.samples.len()), &wave.rays, (&*wave).into());
         let (gaps, counts) = (before.as_ref().map(|before| before as &dyn Gaps), self.counts.of(class));
         if wave.starts {
             self.asking.closest_of(&wave.rays, (None, gaps), &mut hits, counts);

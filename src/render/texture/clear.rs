@@ -9,11 +9,11 @@ use crate::scene::{Bitmap, Filter, Mipmaps, Pixels};
 /// far as whole cells cover it.
 const CELLS: usize = 512;
 
-/// No map is surveyed by more cells than these.
+/// No map is surveyed by more cells than these: none that is larger and repeats with a side that cannot be halved.
 const MOST: usize = 1 << 20;
 
-/// Texels on both sides of a place that a lookup reads, in widths of the largest ones: those next to it, and what is left of
-/// them.
+/// Texels on both sides of a place that a lookup reads, in widths of the largest ones: those next to it, each as far as it
+/// goes.
 const BESIDE: f32 = 1.5;
 
 /// Beyond these levels nothing is said.
@@ -79,7 +79,8 @@ impl Clear {
     }
 
     /// Texels along both axes.
-    pub(crate) fn size(&self) -> Vec2 {
+    #[cfg(test)]
+    fn size(&self) -> Vec2 {
         self.size
     }
 
@@ -123,7 +124,8 @@ impl Clear {
         let covered = if self.several { shorter.max(longer / MAX_PROBES) } else { longer };
         let level = if self.levels { doublings(2.0 * ROUNDING * covered) as usize } else { 0 };
         let probing = if self.several { 0.5 * ROUNDING * longer } else { 0.0 };
-        self.reach[level.min(LEVELS - 1)] + probing
+        // Also where there is no number.
+        if longer >= 0.0 { self.reach[level.min(LEVELS - 1)] + probing } else { f32::INFINITY }
     }
 }
 
@@ -204,7 +206,7 @@ fn steps([columns, rows]: [usize; 2], wrap: [Wrap; 2], filled: &[bool]) -> Vec<u
         for y in (0..rows).rev() {
             step(&mut steps, y, Some(y + 1).filter(|&y| y < rows).or(over.then_some(0)));
         }
-        if steps == known {
+        if steps == known || !(around || over) {
             return steps;
         }
     }

@@ -20,6 +20,7 @@ use crate::scene::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Scene, Texture, Wra
 use decode::Texels;
 use pyramid::{Plane, Pyramid, Stored};
 use std::ops::{Add, Mul, Sub};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// What the numbers of a bitmap mean; the slot that reads it decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +47,11 @@ pub struct TextureStore<'a> {
     bitmaps: Vec<Option<Source<'a>>>,
     /// What is read where there is no map.
     stand_in: Option<Source<'static>>,
+    surveys: Surveys,
 }
+
+/// What was found of maps that were surveyed: of a texture's channel, up to what code it is clear, and where.
+type Surveys = Mutex<Vec<((u32, usize, u8), Arc<Option<Clear>>)>>;
 
 /// The texture of maps that are not there.
 pub(super) const STAND_IN: u32 = u32::MAX;
@@ -81,7 +86,7 @@ impl<'a> TextureStore<'a> {
     /// Makes the scene's textures readable; copies and computes nothing.
     pub fn new(scene: &'a Scene) -> Self {
         let bitmaps = scene.bitmaps.iter().map(|bitmap| is_whole(bitmap).then(|| Source::new(bitmap)));
-        Self { textures: &scene.textures, bitmaps: bitmaps.collect(), stand_in: None }
+        Self { textures: &scene.textures, bitmaps: bitmaps.collect(), stand_in: None, surveys: Surveys::default() }
     }
 
     /// The same, in which maps that are not there are read, too, for nothing (see [`everything`](super::everything)).
@@ -117,6 +122,19 @@ impl<'a> TextureStore<'a> {
     pub(super) fn changes(&self, texture: u32, uv: Vec2, ways: [Vec2; 2], reach: f32) -> [Vec4; 2] {
         let Some((sampler, source)) = self.find(texture) else { return [Vec4::ZERO; 2] };
         source.lookup(ColorSpace::Linear, sampler).changes(uv, ways, reach)
+    }
+
+    /// Where the channel of a map is clear (see [`Clear`]): what is no more than `most`, of 8 bits, is as good as nothing. Found
+    /// once; `None` where that is nowhere, or would take long.
+    pub(super) fn clear(&self, texture: u32, channel: usize, most: u8) -> Arc<Option<Clear>> {
+        let mut surveys = self.surveys.lock().unwrap_or_else(PoisonError::into_inner);
+        let what = (texture, channel, most);
+        if let Some((_, known)) = surveys.iter().find(|(known, _)| *known == what) {
+            return Arc::clone(known);
+        }
+        let found = Arc::new(Clear::of(self, texture, channel, most));
+        surveys.push((what, Arc::clone(&found)));
+        found
     }
 
     fn find(&self, texture: u32) -> Option<(Sampler, &Source<'a>)> {
