@@ -11,9 +11,9 @@ pub trait Holes {
 
 /// Who knows where prims that are not opaque are not there, for rays that ask what they hit first.
 pub trait Gaps {
-    /// Whether ray number `ray` of those that were asked finds nothing for certain where it meets prim `prim`, if it does. Who is not sure
-    /// says no: a structure may take any hit for one, and whoever asked goes on behind it by itself. It may be asked more than
-    /// once, in any order.
+    /// Whether ray number `ray` of those that were asked finds nothing for certain where it meets prim `prim`, if it does. Who
+    /// is not sure says no: a structure may take any hit for one, and whoever asked goes on behind it by itself. It may be
+    /// asked more than once, in any order.
     fn is_gap(&self, ray: usize, prim: u32) -> bool;
 
     /// The same of the rays of a mask, of which the first is ray `first`.
