@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use meshray::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray, Shapes, Splitting, Wide};
+use meshray::accel::{Accel, Hit, Looking, NO_PRIM, NoProbe, Ray, Shapes, Splitting, Wide};
 
 use crate::tracer::{Answer, Rays, Tracer};
 
@@ -55,10 +55,8 @@ impl Tracer for Ours<'_> {
             }
         } else {
             hits.resize(rays.len(), Hit::MISS);
-            match &pencil {
-                Some(pencil) => self.wide.closest_from(pencil, rays, hits, scratch, &mut NoProbe),
-                None => self.wide.closest(rays, hits, scratch, &mut NoProbe),
-            }
+            let looking = Looking { pencil: pencil.as_ref(), ..Looking::along(rays) };
+            self.wide.look(&looking, hits, scratch, &mut NoProbe);
             for (answer, hit) in answers.iter_mut().zip(hits) {
                 *answer = Answer { prim: hit.prim, t: hit.t };
             }

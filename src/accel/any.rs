@@ -6,7 +6,7 @@ use super::intersector::{IntersectorKind, Looked, MollerTrumbore, MollerTrumbore
 use super::query::{Culling, Tested};
 use super::volumes::{Ball, Volumes};
 use super::{
-    Accel, AccelParams, Bvh, GridOctree, Hit, Holes, Kept, Looking, NoProbe, Pencil, Probe, Ray, Shapes, Splitting,
+    Accel, AccelParams, Bvh, GridOctree, Hit, Holes, Kept, Looking, NoProbe, Probe, Ray, Shapes, Splitting,
     StructureStats, Transformed, TwoLevel, Unculled, Wide,
 };
 use crate::math::aabb::Aabb;
@@ -215,22 +215,6 @@ impl<'a> AnyAccel<'a> {
         whichever!(&self.structure, a => a.check())
     }
 
-    fn ask_first<P: Probe>(
-        &self,
-        pencil: Option<&Pencil>,
-        rays: &[Ray],
-        hits: &mut [Hit],
-        scratch: &mut AnyScratch,
-        probe: &mut P,
-    ) {
-        assert_eq!(rays.len(), hits.len(), "a hit for each ray");
-        if P::SILENT {
-            self.ask(FirstHits { rays, pencil, hits, probe: &mut NoProbe }, scratch);
-        } else {
-            self.ask(FirstHits { rays, pencil, hits, probe }, scratch);
-        }
-    }
-
     fn ask<Q: Question>(&self, question: Q, scratch: &mut AnyScratch) {
         match &self.structure {
             // What is timed has code of its own for every test.
@@ -284,23 +268,9 @@ impl Accel for AnyAccel<'_> {
 
     // All that are silent share what is compiled for one.
 
-    fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
-        self.ask_first(None, rays, hits, scratch, probe);
-    }
-
-    fn closest_from<P: Probe>(
-        &self,
-        pencil: &Pencil,
-        rays: &[Ray],
-        hits: &mut [Hit],
-        scratch: &mut AnyScratch,
-        probe: &mut P,
-    ) {
-        self.ask_first(Some(pencil), rays, hits, scratch, probe);
-    }
-
     fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
-        assert_eq!(looking.rays.len(), hits.len(), "a hit for each ray");
+        let after = looking.after.map_or(hits.len(), <[Hit]>::len);
+        assert_eq!([after, hits.len()], [looking.rays.len(); 2], "a hit before and after for each ray");
         if P::SILENT {
             self.ask(Looks { looking, hits, probe: &mut NoProbe }, scratch);
         } else {
@@ -321,33 +291,6 @@ impl Accel for AnyAccel<'_> {
             self.ask(Blocked { rays, holes, blocked, probe: &mut NoProbe }, scratch);
         } else {
             self.ask(Blocked { rays, holes, blocked, probe }, scratch);
-        }
-    }
-
-    fn next<P: Probe>(&self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
-        assert_eq!([after.len(), hits.len()], [rays.len(); 2], "a hit before and after for each ray");
-        if P::SILENT {
-            self.ask(NextHits { rays, after, hits, probe: &mut NoProbe }, scratch);
-        } else {
-            self.ask(NextHits { rays, after, hits, probe }, scratch);
-        }
-    }
-}
-
-struct FirstHits<'q, P> {
-    rays: &'q [Ray],
-    pencil: Option<&'q Pencil<'q>>,
-    hits: &'q mut [Hit],
-    probe: &'q mut P,
-}
-
-impl<P: Probe> Question for FirstHits<'_, P> {
-    const SILENT: bool = P::SILENT;
-
-    fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
-        match self.pencil {
-            Some(pencil) => accel.closest_from(pencil, self.rays, self.hits, scratch, self.probe),
-            None => accel.closest(self.rays, self.hits, scratch, self.probe),
         }
     }
 }
@@ -378,20 +321,5 @@ impl<P: Probe> Question for Blocked<'_, P> {
 
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
         accel.blocked(self.rays, self.holes, self.blocked, scratch, self.probe);
-    }
-}
-
-struct NextHits<'q, P> {
-    rays: &'q [Ray],
-    after: &'q [Hit],
-    hits: &'q mut [Hit],
-    probe: &'q mut P,
-}
-
-impl<P: Probe> Question for NextHits<'_, P> {
-    const SILENT: bool = P::SILENT;
-
-    fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
-        accel.next(self.rays, self.after, self.hits, scratch, self.probe);
     }
 }

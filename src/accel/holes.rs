@@ -18,25 +18,37 @@ pub trait Gaps {
 
     /// The same of the rays of a mask, of which the first is ray `first`.
     fn gaps(&self, first: usize, rays: u32, prim: u32) -> u32 {
-        let (mut gaps, mut left) = (0, rays);
-        while left != 0 {
-            let ray = left.trailing_zeros();
-            left &= left - 1;
-            gaps |= u32::from(self.is_gap(first + ray as usize, prim)) << ray;
-        }
-        gaps
+        those(rays, |ray| self.is_gap(first + ray, prim))
     }
 }
 
-/// Rays that are asked for their first hits, and pass gaps that are known.
+/// The rays of a mask of which something is true.
+pub(super) fn those(rays: u32, is_true: impl Fn(usize) -> bool) -> u32 {
+    let (mut those, mut left) = (0, rays);
+    while left != 0 {
+        let ray = left.trailing_zeros();
+        left &= left - 1;
+        those |= u32::from(is_true(ray as usize)) << ray;
+    }
+    those
+}
+
+/// Rays that are asked for their first hits.
 #[derive(Clone, Copy)]
 pub struct Looking<'w> {
     /// The rays.
     pub rays: &'w [Ray],
-    /// The same as a pencil, if they are one.
+    /// The same as a pencil, if they are one and start there: who traces rays from one place together reads them there.
     pub pencil: Option<&'w Pencil<'w>>,
     /// The hit of each behind which it goes on, if they do.
     pub after: Option<&'w [Hit]>,
-    /// Who knows of gaps.
-    pub gaps: &'w dyn Gaps,
+    /// Who knows of gaps that they may pass, if anybody does.
+    pub gaps: Option<&'w dyn Gaps>,
+}
+
+impl<'w> Looking<'w> {
+    /// Rays from their start on that pass nothing.
+    pub fn along(rays: &'w [Ray]) -> Self {
+        Self { rays, pencil: None, after: None, gaps: None }
+    }
 }

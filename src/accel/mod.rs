@@ -170,30 +170,9 @@ pub trait Accel: Sync {
     /// A fresh scratch value.
     fn scratch(&self) -> Self::Scratch;
 
-    /// The first hit of each ray in `t_min..=t_max`; [`Hit::MISS`] where there is none.
-    fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P);
-
-    /// [`Self::closest`] for rays that are those of a pencil, too: who traces rays from one place together reads them there.
-    fn closest_from<P: Probe>(
-        &self,
-        _pencil: &Pencil,
-        rays: &[Ray],
-        hits: &mut [Hit],
-        scratch: &mut Self::Scratch,
-        probe: &mut P,
-    ) {
-        self.closest(rays, hits, scratch, probe);
-    }
-
-    /// The first hit of each ray, or the first behind another, but for hits with what is known to be gaps: some of these may be
-    /// passed, or none. Rays that go on are those of no pencil.
-    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        match *looking {
-            Looking { rays, after: Some(after), .. } => self.next(rays, after, hits, scratch, probe),
-            Looking { rays, pencil: Some(pencil), .. } => self.closest_from(pencil, rays, hits, scratch, probe),
-            Looking { rays, .. } => self.closest(rays, hits, scratch, probe),
-        }
-    }
+    /// The first hit of each ray in `t_min..=t_max`, or the first there that comes after another in the order (t, prim), but for
+    /// hits with what is known to be gaps: some of these may be passed, or none. [`Hit::MISS`] where there is none.
+    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P);
 
     /// Whether anything *opaque* lies in `t_min..=t_max` of each ray: prims with a bit in [`Shapes::opaque`]. In a
     /// scene, faces of masked, blended and transmissive materials are opaque only where their maps let nothing through;
@@ -212,7 +191,21 @@ pub trait Accel: Sync {
         probe: &mut P,
     );
 
+    /// The first hit of each ray in `t_min..=t_max`; [`Hit::MISS`] where there is none.
+    fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
+        self.look(&Looking::along(rays), hits, scratch, probe);
+    }
+
     /// The first hit of each ray in `t_min..=t_max` that comes after `after` in the order (t, prim). All hits are found one
     /// after the other from [`Hit::BEFORE_ALL`] on, until one is [`Hit::MISS`].
-    fn next<P: Probe>(&self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P);
+    fn next<P: Probe>(
+        &self,
+        rays: &[Ray],
+        after: &[Hit],
+        hits: &mut [Hit],
+        scratch: &mut Self::Scratch,
+        probe: &mut P,
+    ) {
+        self.look(&Looking { after: Some(after), ..Looking::along(rays) }, hits, scratch, probe);
+    }
 }

@@ -6,7 +6,7 @@
 use super::intersector::{Exact, Intersector};
 use super::probe::{Outcome, Test};
 use super::wave::{ForAny, ForFirst, ForNext, Wave, begin, end};
-use super::{Accel, Hit, Holes, Looking, NO_PRIM, Pencil, Probe, Ray, Shapes};
+use super::{Accel, Hit, Holes, Looking, NO_PRIM, Probe, Ray, Shapes};
 use crate::math::shear::RaySpace;
 use crate::math::simd::LANES;
 use crate::math::triangle::{self, Meeting, Triangle};
@@ -454,27 +454,13 @@ impl<C: Culling> Accel for C {
         self.new_scratch()
     }
 
-    fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        self.trace(&mut ForFirst { rays, pencil: None, gaps: None, hits, test: Exact }, scratch, probe);
-    }
-
-    fn closest_from<P: Probe>(
-        &self,
-        pencil: &Pencil,
-        rays: &[Ray],
-        hits: &mut [Hit],
-        scratch: &mut Self::Scratch,
-        probe: &mut P,
-    ) {
-        self.trace(&mut ForFirst { rays, pencil: Some(*pencil), gaps: None, hits, test: Exact }, scratch, probe);
-    }
-
     fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
         let Looking { rays, pencil, after, gaps } = *looking;
-        let (gaps, test) = (Some(gaps), Exact);
         match after {
-            Some(after) => self.trace(&mut ForNext { rays, after, gaps, hits, test }, scratch, probe),
-            None => self.trace(&mut ForFirst { rays, pencil: pencil.copied(), gaps, hits, test }, scratch, probe),
+            Some(after) => self.trace(&mut ForNext { rays, after, gaps, hits, test: Exact }, scratch, probe),
+            None => {
+                self.trace(&mut ForFirst { rays, pencil: pencil.copied(), gaps, hits, test: Exact }, scratch, probe)
+            }
         }
     }
 
@@ -487,17 +473,6 @@ impl<C: Culling> Accel for C {
         probe: &mut P,
     ) {
         self.trace(&mut ForAny { rays, holes, blocked, test: Exact }, scratch, probe);
-    }
-
-    fn next<P: Probe>(
-        &self,
-        rays: &[Ray],
-        after: &[Hit],
-        hits: &mut [Hit],
-        scratch: &mut Self::Scratch,
-        probe: &mut P,
-    ) {
-        self.trace(&mut ForNext { rays, after, gaps: None, hits, test: Exact }, scratch, probe);
     }
 }
 
@@ -522,8 +497,13 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
         self.structure.new_scratch()
     }
 
-    fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        self.structure.trace(&mut ForFirst { rays, pencil: None, gaps: None, hits, test: self.test }, scratch, probe);
+    // Pencils and gaps are for the exact test.
+    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
+        let (Looking { rays, after, .. }, gaps, test) = (*looking, None, self.test);
+        match after {
+            Some(after) => self.structure.trace(&mut ForNext { rays, after, gaps, hits, test }, scratch, probe),
+            None => self.structure.trace(&mut ForFirst { rays, pencil: None, gaps, hits, test }, scratch, probe),
+        }
     }
 
     fn blocked<P: Probe>(
@@ -535,16 +515,5 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
         probe: &mut P,
     ) {
         self.structure.trace(&mut ForAny { rays, holes, blocked, test: self.test }, scratch, probe);
-    }
-
-    fn next<P: Probe>(
-        &self,
-        rays: &[Ray],
-        after: &[Hit],
-        hits: &mut [Hit],
-        scratch: &mut Self::Scratch,
-        probe: &mut P,
-    ) {
-        self.structure.trace(&mut ForNext { rays, after, gaps: None, hits, test: self.test }, scratch, probe);
     }
 }

@@ -7,7 +7,9 @@ use super::machine::Machine;
 use super::rays::{Class, RaySet, record};
 use super::report::{Format, Model, Rays, Report, text};
 use super::row::Row;
-use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Count, Hit, Holes, Probe, Ray, RayCounts, Unculled};
+use crate::accel::{
+    Accel, AccelKind, AccelParams, AnyAccel, Count, Hit, Holes, Looking, Probe, Ray, RayCounts, Unculled,
+};
 use crate::load::{LoadOptions, load_bytes};
 use crate::render::texture::TextureStore;
 use crate::render::{ClassCounts, Filters, Job, Question, Settings, View, World, render_counted};
@@ -148,8 +150,8 @@ impl Accel for Blind<'_> {
 
     fn scratch(&self) {}
 
-    fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut (), probe: &mut P) {
-        self.0.closest(rays, hits, scratch, probe);
+    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut (), probe: &mut P) {
+        self.0.look(looking, hits, scratch, probe);
         hits.iter_mut().filter(|h| h.prim == self.1).for_each(|h| *h = Hit::MISS);
     }
 
@@ -162,10 +164,6 @@ impl Accel for Blind<'_> {
         probe: &mut P,
     ) {
         self.0.blocked(rays, holes, blocked, scratch, probe);
-    }
-
-    fn next<P: Probe>(&self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], scratch: &mut (), probe: &mut P) {
-        self.0.next(rays, after, hits, scratch, probe);
     }
 }
 

@@ -3,7 +3,7 @@
 use super::Progress;
 use super::filters::Through;
 use super::observer::{Observer, Question};
-use crate::accel::{Accel, Gaps, Hit, Holes, Looking, Pencil, Ray};
+use crate::accel::{Accel, Gaps, Hit, Holes, Looking, Ray};
 
 /// A structure, one worker's scratch for it, and whoever may end the work.
 pub(crate) struct Asking<'a, A: Accel> {
@@ -21,35 +21,32 @@ impl<'a, A: Accel> Asking<'a, A> {
 
     /// The first hit of each ray.
     pub(crate) fn closest<P: Observer>(&mut self, rays: &[Ray], hits: &mut [Hit], probe: &mut P) {
-        self.closest_of(rays, (None, None), hits, probe);
+        self.look(&Looking::along(rays), hits, probe);
     }
 
-    /// The same of rays that are those of a pencil, if there is one, and that may pass gaps, if anybody knows of any.
-    pub(crate) fn closest_of<P: Observer>(
-        &mut self,
-        rays: &[Ray],
-        (pencil, gaps): (Option<Pencil>, Option<&dyn Gaps>),
-        hits: &mut [Hit],
-        probe: &mut P,
-    ) {
-        let slices = rays.chunks(P::SLICE).zip(hits.chunks_mut(P::SLICE));
-        for (start, (rays, hits)) in (0..).step_by(P::SLICE).zip(slices) {
+    /// The same, or the first behind another; they may pass gaps that are known.
+    pub(crate) fn look<P: Observer>(&mut self, looking: &Looking, hits: &mut [Hit], probe: &mut P) {
+        let question = if looking.after.is_some() { Question::Next } else { Question::Closest };
+        for (k, hits) in hits.chunks_mut(P::SLICE).enumerate() {
             if self.gives_up() {
                 return;
             }
-            probe.asked(Question::Closest, rays, &[]);
-            let pencil = pencil.map(|pencil| pencil.part(start..start + rays.len()));
-            match (gaps, &pencil) {
-                (Some(gaps), pencil) => {
-                    let gaps = &Since { gaps, start };
-                    let looking = Looking { rays, pencil: pencil.as_ref(), after: None, gaps };
-                    self.accel.look(&looking, hits, &mut self.scratch, probe);
-                }
-                (None, Some(pencil)) => self.accel.closest_from(pencil, rays, hits, &mut self.scratch, probe),
-                (None, None) => self.accel.closest(rays, hits, &mut self.scratch, probe),
-            }
+            let start = k * P::SLICE;
+            let part = start..start + hits.len();
+            let (rays, after) = (&looking.rays[part.clone()], looking.after.map(|after| &after[part.clone()]));
+            let pencil = looking.pencil.map(|pencil| pencil.part(part));
+            let since = looking.gaps.map(|gaps| Since { gaps, start });
+            let gaps = since.as_ref().map(|since| since as &dyn Gaps);
+            probe.asked(question, rays, after.unwrap_or_default());
+            let looking = Looking { rays, pencil: pencil.as_ref(), after, gaps };
+            self.accel.look(&looking, hits, &mut self.scratch, probe);
             probe.answered(hits);
         }
+    }
+
+    /// The first hit of each ray behind `after`.
+    pub(crate) fn next<P: Observer>(&mut self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], probe: &mut P) {
+        self.look(&Looking { after: Some(after), ..Looking::along(rays) }, hits, probe);
     }
 
     /// Whether anything opaque is hit by each ray.
@@ -73,32 +70,6 @@ impl<'a, A: Accel> Asking<'a, A> {
             let holes = part.as_ref().map(|part| part as &dyn Holes);
             self.accel.blocked(rays, holes, blocked, &mut self.scratch, probe);
             probe.answered(&[]);
-        }
-    }
-
-    /// The first hit of each ray behind `after`; they may pass gaps, if anybody knows of any.
-    pub(crate) fn next<P: Observer>(
-        &mut self,
-        rays: &[Ray],
-        (after, gaps): (&[Hit], Option<&dyn Gaps>),
-        hits: &mut [Hit],
-        probe: &mut P,
-    ) {
-        let slices = rays.chunks(P::SLICE).zip(after.chunks(P::SLICE)).zip(hits.chunks_mut(P::SLICE));
-        for (start, ((rays, after), hits)) in (0..).step_by(P::SLICE).zip(slices) {
-            if self.gives_up() {
-                return;
-            }
-            probe.asked(Question::Next, rays, after);
-            match gaps {
-                Some(gaps) => {
-                    let gaps = &Since { gaps, start };
-                    let looking = Looking { rays, pencil: None, after: Some(after), gaps };
-                    self.accel.look(&looking, hits, &mut self.scratch, probe);
-                }
-                None => self.accel.next(rays, after, hits, &mut self.scratch, probe),
-            }
-            probe.answered(hits);
         }
     }
 

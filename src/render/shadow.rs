@@ -165,7 +165,7 @@ impl Shadows {
             self.filter(context);
             self.hits.clear();
             self.hits.resize(self.going.len(), Hit::MISS);
-            asking.next(&self.on_way, (&self.after, None), &mut self.hits, probe);
+            asking.next(&self.on_way, &self.after, &mut self.hits, probe);
         }
     }
 
@@ -203,7 +203,7 @@ impl Shadows {
             rays.truncate(after.len());
             raised.truncate(after.len());
             hits.truncate(after.len());
-            asking.next(&rays, (&after, None), &mut hits, probe);
+            asking.next(&rays, &after, &mut hits, probe);
         }
     }
 

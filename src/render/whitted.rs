@@ -27,7 +27,7 @@ use super::sky::{Arounds, Standpoint};
 use super::sobol::mix;
 use super::surface::{Surface, Target};
 use super::wave::{Crossing, Path, Queue, RayClass, Wave};
-use crate::accel::{Accel, Gaps, Hit, Ray};
+use crate::accel::{Accel, Gaps, Hit, Looking, Ray};
 use crate::math::{DVec3, Vec3};
 use bytemuck::{Pod, Zeroable};
 use std::hint::black_box;
@@ -152,7 +152,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             let of = (RayClass::Primary, self.samples.len());
             let before = self.context.before::<P>(of, rays, Cones::Eyes(cones));
             let gaps = before.as_ref().map(|before| before as &dyn Gaps);
-            self.asking.closest_of(rays, (pencil, gaps), hits, self.counts.of(RayClass::Primary));
+            let looking = Looking { rays, pencil: pencil.as_ref(), after: None, gaps };
+            self.asking.look(&looking, hits, self.counts.of(RayClass::Primary));
         }
         if !self.asking.cancelled {
             self.shade_eyes(&eyes);
@@ -167,12 +168,10 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let wave = &mut self.wave;
         let mut hits = std::mem::take(&mut wave.hits);
         let before = self.context.before::<P>((class, self.samples.len()), &wave.rays, (&*wave).into());
-        let (gaps, counts) = (before.as_ref().map(|before| before as &dyn Gaps), self.counts.of(class));
-        if wave.starts {
-            self.asking.closest_of(&wave.rays, (None, gaps), &mut hits, counts);
-        } else {
-            self.asking.next(&wave.rays, (&wave.after, gaps), &mut hits, counts);
-        }
+        let gaps = before.as_ref().map(|before| before as &dyn Gaps);
+        let after = (!wave.starts).then_some(wave.after.as_slice());
+        let looking = Looking { rays: &wave.rays, pencil: None, after, gaps };
+        self.asking.look(&looking, &mut hits, self.counts.of(class));
         wave.hits = hits;
         Some(class)
     }

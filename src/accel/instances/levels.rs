@@ -8,7 +8,7 @@ use crate::accel::slabs::BoxRay;
 use crate::accel::stats::listed_once;
 use crate::accel::wide::split::Item;
 use crate::accel::wide::{Splitting, Stack};
-use crate::accel::{Accel, Hit, Holes, NO_PRIM, Probe, Ray, Shapes, StructureStats, Wide};
+use crate::accel::{Accel, Hit, Holes, Looking, NO_PRIM, Probe, Ray, Shapes, StructureStats, Wide};
 use crate::math::aabb::Aabb;
 use rayon::prelude::*;
 
@@ -202,10 +202,19 @@ impl Accel for TwoLevel<'_> {
         }
     }
 
-    fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut LevelScratch, probe: &mut P) {
+    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut LevelScratch, probe: &mut P) {
+        let rays = looking.rays;
         self.renumber(rays, &mut scratch.rays);
-        self.stored.closest(&scratch.rays, hits, &mut scratch.stored, probe);
-        self.go_on(rays, hits, scratch, probe, |i, known| (rays[i].t_min, Closest::before(known, Exact)));
+        let Some(after) = looking.after else {
+            self.stored.closest(&scratch.rays, hits, &mut scratch.stored, probe);
+            return self.go_on(rays, hits, scratch, probe, |i, known| (rays[i].t_min, Closest::before(known, Exact)));
+        };
+        scratch.after.clear();
+        scratch.after.extend(after.iter().map(|after| self.after(after)));
+        self.stored.next(&scratch.rays, &scratch.after, hits, &mut scratch.stored, probe);
+        self.go_on(rays, hits, scratch, probe, |i, known| {
+            (rays[i].t_min.max(after[i].t), Next::between(&after[i], known, Exact))
+        });
     }
 
     fn blocked<P: Probe>(
@@ -230,15 +239,5 @@ impl Accel for TwoLevel<'_> {
                 probe.found();
             }
         }
-    }
-
-    fn next<P: Probe>(&self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], scratch: &mut LevelScratch, probe: &mut P) {
-        self.renumber(rays, &mut scratch.rays);
-        scratch.after.clear();
-        scratch.after.extend(after.iter().map(|after| self.after(after)));
-        self.stored.next(&scratch.rays, &scratch.after, hits, &mut scratch.stored, probe);
-        self.go_on(rays, hits, scratch, probe, |i, known| {
-            (rays[i].t_min.max(after[i].t), Next::between(&after[i], known, Exact))
-        });
     }
 }

@@ -24,6 +24,7 @@ use super::node::{Block, Child, Node, Tree};
 use super::shelf::Shelf;
 use super::slabs::BoxMargins;
 use super::walk::Entry;
+use crate::accel::holes::those;
 use crate::accel::query::Goal;
 use crate::accel::wave::{Pencil, Wave};
 use crate::accel::{Hit, NO_PRIM, Ray, Shapes};
@@ -480,13 +481,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     #[cold]
     #[inline(never)]
     fn minding<W: Wave>(&self, wave: &W, prim: u32, rays: u32) -> u32 {
-        let (mut minding, mut left) = (0, rays);
-        while left != 0 {
-            let ray = left.trailing_zeros();
-            left &= left - 1;
-            minding |= u32::from(wave.goal(self.start + ray as usize).minds(false, prim)) << ray;
-        }
-        minding
+        those(rays, |ray| wave.goal(self.start + ray).minds(false, prim))
     }
 
     /// Where the rays of a mask meet what they hit.

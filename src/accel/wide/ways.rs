@@ -137,7 +137,8 @@ fn assert_a_pencil_hits(name: &str, shapes: &Shapes, rays: &[Ray], ways: &[RayOr
         for splitting in [Splitting::SurfaceArea, Splitting::Octree] {
             let wide = Wide::build(shapes, splitting).at_level(level).with_rays(way);
             let mut hits = vec![Hit::MISS; rays.len()];
-            wide.closest_from(&pencil, rays, &mut hits, &mut wide.scratch(), &mut NoProbe);
+            let looking = Looking { pencil: Some(&pencil), ..Looking::along(rays) };
+            wide.look(&looking, &mut hits, &mut wide.scratch(), &mut NoProbe);
             let hits: Vec<_> = hits.iter().map(Hit::bits).collect();
             assert!(hits == expected, "{name}: {way:?} on {}", level.name());
         }
@@ -189,7 +190,7 @@ impl Gaps for Lattice<'_> {
 fn passed(shapes: &Shapes, wide: &Wide, rays: &[Ray], after: Option<&[Hit]>, what: &str) -> usize {
     let (brute, gaps) = (Unculled::new(shapes), Lattice(shapes));
     let (mut hits, mut count) = (vec![Hit::MISS; rays.len()], 0);
-    let looking = Looking { rays, pencil: None, after, gaps: &gaps };
+    let looking = Looking { rays, pencil: None, after, gaps: Some(&gaps) };
     wide.look(&looking, &mut hits, &mut wide.scratch(), &mut NoProbe);
     for (i, (ray, hit)) in rays.iter().zip(&hits).enumerate() {
         let (mut before, mut met) = (after.map_or(Hit::BEFORE_ALL, |after| after[i]), [Hit::MISS]);
