@@ -176,8 +176,8 @@ impl<'a> Through<'a> {
 impl Holes for Through<'_> {
     fn stops(&self, number: usize, prim: u32) -> bool {
         let (context, ray) = (self.context, &self.rays[number]);
-        if context.clearings.as_ref().is_some_and(|clearings| clearings.lets_through(ray, prim)) {
-            return false;
+        if let Some(stops) = context.clearings.as_ref().and_then(|clearings| clearings.stops(ray, prim)) {
+            return stops;
         }
         let shape = context.world.prim(prim);
         let space = RaySpace::checked(ray.origin, ray.dir).0;

@@ -1,15 +1,15 @@
 //! Rays pass what is known to be a gap, and pictures are the same bit by bit.
 
 use super::*;
-use crate::math::Vec2;
 use crate::math::random::Random;
+use crate::math::{Vec2, Vec4};
 use crate::render::profile::render_profiled;
 use crate::scene::{
     AlphaMode, Bitmap, Environment, MetalRough, Pixels, Sampler, Texture, TextureRef, UvTransform, Wrap,
 };
 
 /// Cards with spots on them, thick as leaves before a mirror and beside a lamp: some turn their backs, some are mirrored, some
-/// stand in one place, some are painted twice, and their maps repeat, end, or are turned.
+/// stand in one place, and their maps repeat, end, or are turned.
 fn canopy(alpha_mode: AlphaMode, side: u32, branching: bool) -> Stage {
     let mut random = Random::new(41);
     let view = View::look_at(DVec3::new(0.5, 0.3, 7.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.6));
@@ -56,15 +56,29 @@ fn canopy(alpha_mode: AlphaMode, side: u32, branching: bool) -> Stage {
         let mut mesh = square(0.0, 0.45);
         mesh.uvs = vec![mesh.positions.iter().map(|p| p.truncate() * [1.1, 1.9][i as usize % 2]).collect()];
         if i % 11 == 4 {
-            mesh.colors = vec![glam::Vec4::new(1.0, 0.8, 0.7, 0.6); 4];
+            mesh.colors = vec![Vec4::new(1.0, 0.8, 0.7, 0.6), Vec4::ONE, Vec4::new(0.3, 1.0, 1.0, 0.9), Vec4::ONE];
         }
         let at = random.cube().as_dvec3() * 1.6;
         let (a, b) = (f64::from(random.unit()) * 6.0, f64::from(random.unit()) * 6.0);
         let mirrored = DAffine3::from_scale(DVec3::new(if i % 5 == 2 { -1.0 } else { 1.0 }, 1.0, 1.0));
         let place = DAffine3::from_translation(at) * DAffine3::from_rotation_y(a) * DAffine3::from_rotation_x(b);
-        s.mesh(mesh.clone(), place * mirrored, leaf.clone());
-        if i % 9 == 0 {
-            s.mesh(mesh, place * mirrored, leaf);
+        s.mesh(mesh.clone(), place * mirrored, leaf);
+        // What lies in one place, of one material, is one surface where it turns the same side to a ray.
+        let (material, count) = (s.scene.materials.len() as u32 - 1, s.scene.meshes.len() as u32);
+        let again = Instance { name: String::new(), mesh: count - 1, world_from_object: place * mirrored };
+        match i % 9 {
+            0 => s.scene.instances.push(again),
+            1 => {
+                mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+                s.scene.meshes.push(Mesh { material, ..mesh });
+                s.scene.instances.push(Instance { mesh: count, ..again });
+            }
+            2 => {
+                mesh.uvs[0].rotate_left(1);
+                s.scene.meshes.push(Mesh { material, ..mesh });
+                s.scene.instances.push(Instance { mesh: count, ..again });
+            }
+            _ => {}
         }
     }
     s

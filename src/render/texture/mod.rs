@@ -6,13 +6,13 @@
 //!
 //! Every lookup is a pure function of the scene and its arguments: no state, no order, the same bits on every thread.
 
-mod clear;
 mod decode;
 mod places;
 mod pyramid;
+mod survey;
 
-pub(crate) use clear::Clear;
 pub(crate) use places::{Layout, Places, Spots, changes};
+pub(crate) use survey::{Codes, Survey};
 
 use crate::math::formula::floor;
 use crate::math::{Vec2, Vec4};
@@ -50,8 +50,8 @@ pub struct TextureStore<'a> {
     surveys: Surveys,
 }
 
-/// What was found of maps that were surveyed: of a texture's channel, up to what code it is clear, and where.
-type Surveys = Mutex<Vec<((u32, usize, u8), Arc<Option<Clear>>)>>;
+/// What was found of maps that were surveyed, by texture, channel, and what its codes mean.
+type Surveys = Mutex<Vec<((u32, usize, Codes), Arc<Option<Survey>>)>>;
 
 /// The texture of maps that are not there.
 pub(super) const STAND_IN: u32 = u32::MAX;
@@ -124,15 +124,14 @@ impl<'a> TextureStore<'a> {
         source.lookup(ColorSpace::Linear, sampler).changes(uv, ways, reach)
     }
 
-    /// Where the channel of a map is clear (see [`Clear`]): what is no more than `most`, of 8 bits, is as good as nothing. Found
-    /// once; `None` where that is nowhere, or would take long.
-    pub(super) fn clear(&self, texture: u32, channel: usize, most: u8) -> Arc<Option<Clear>> {
+    /// Where the channel of a map is clear or solid. Found once; `None` where that is nowhere, or would take long.
+    pub(super) fn survey(&self, texture: u32, channel: usize, codes: Codes) -> Arc<Option<Survey>> {
         let mut surveys = self.surveys.lock().unwrap_or_else(PoisonError::into_inner);
-        let what = (texture, channel, most);
+        let what = (texture, channel, codes);
         if let Some((_, known)) = surveys.iter().find(|(known, _)| *known == what) {
             return Arc::clone(known);
         }
-        let found = Arc::new(Clear::of(self, texture, channel, most));
+        let found = Arc::new(Survey::of(self, texture, channel, codes));
         surveys.push((what, Arc::clone(&found)));
         found
     }

@@ -22,6 +22,7 @@ use crate::math::{DMat3, DVec3, Vec3};
 use crate::scene::mesh::normal_from_object;
 use crate::scene::{Material, Scene};
 use solid::Solid;
+pub(super) use solid::{code, least as least_solid};
 use std::ops::Range;
 
 /// A [`Scene`] placed for tracing. World position = `center` + position in [`Shapes`].

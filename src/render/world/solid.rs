@@ -88,7 +88,7 @@ const RED: usize = 0;
 const ALPHA: usize = 3;
 
 /// The least alpha of a map of base colours, 0 … 1, with which a material is there as a whole; `None` if none suffices.
-fn least(material: &Material) -> Option<f32> {
+pub(in crate::render) fn least(material: &Material) -> Option<f32> {
     /// More than the mean of four texels is rounded, in parts of them.
     const ROUNDING: f32 = 1e-5;
     let opacity = material.opacity;
@@ -193,7 +193,7 @@ impl Blocks {
 
 /// The least stored number that is no less than such a part of the largest.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 … 65535")]
-fn code(part: f32, largest: u16) -> u16 {
+pub(in crate::render) fn code(part: f32, largest: u16) -> u16 {
     libm::ceil(f64::from(part) * f64::from(largest)) as u16
 }
 

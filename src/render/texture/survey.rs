@@ -1,4 +1,4 @@
-//! Where a map says that nothing is there, all around: how far from each place.
+//! Where a map says all around that nothing is there, or that everything is: how far from each place.
 
 use super::{MAX_PROBES, Sampler, TextureStore, Wrap, doublings, pixels, size_of};
 use crate::math::Vec2;
@@ -22,9 +22,18 @@ const LEVELS: usize = 16;
 /// More than rounding changes where steps of levels and probes are.
 const ROUNDING: f32 = 1.02;
 
-/// How far it is from each cell of a map to the nearest one in which anything is.
+/// What a channel of a map says, of 8 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Codes {
+    /// A place is clear with no more than this: it is as good as nothing there.
+    pub most: u8,
+    /// It is solid with no less: it is there as a whole. Beyond 255: nowhere.
+    pub least: u16,
+}
+
+/// How far each cell of a map that is clear, or solid, is away from those that are not.
 #[derive(Debug)]
-pub(crate) struct Clear {
+pub(crate) struct Survey {
     /// Columns and rows.
     cells: [usize; 2],
     /// Texels along each side of a cell, and its inverse.
@@ -33,8 +42,10 @@ pub(crate) struct Clear {
     size: Vec2,
     per_size: Vec2,
     wrap: [Wrap; 2],
-    /// Cells to the nearest one that is not clear, at most 255.
-    steps: Vec<u8>,
+    /// Cells to the nearest one that is not clear, at most 127; below 0 those to the nearest one that is not solid.
+    steps: Vec<i8>,
+    /// Whether any is clear.
+    has_gaps: bool,
     /// How far from its place, in texels, a lookup in a level reads.
     reach: [f32; LEVELS],
     /// Whether there are smaller copies, and whether several probes may be taken.
@@ -42,10 +53,9 @@ pub(crate) struct Clear {
     several: bool,
 }
 
-impl Clear {
-    /// Surveys the channel of a map: what is no more than `most`, of 8 bits, is as good as nothing. `None` where nothing is
-    /// clear, or that would take long.
-    pub(crate) fn of(store: &TextureStore, texture: u32, channel: usize, most: u8) -> Option<Self> {
+impl Survey {
+    /// Surveys the channel of a map. `None` where nothing is clear and nothing solid, or that would take long.
+    pub(crate) fn of(store: &TextureStore, texture: u32, channel: usize, codes: Codes) -> Option<Self> {
         let (sampler, source) = store.find(texture)?;
         let Sampler { minify, mipmaps, wrap_u, wrap_v, .. } = sampler;
         let (bitmap, (width, height)) = (source.bitmap, size_of(source.bitmap));
@@ -62,7 +72,13 @@ impl Clear {
         if cells[0] * cells[1] > MOST {
             return None;
         }
-        let steps = steps(cells, wrap, &filled(bitmap, (channel, most), side, cells)?);
+        let [filled, open] = cells_of(bitmap, (channel, codes), side, cells)?;
+        let has_gaps = filled.contains(&false);
+        if !has_gaps && !open.contains(&false) {
+            return None;
+        }
+        let (clear, solid) = (steps(cells, wrap, &filled), steps(cells, wrap, &open));
+        let steps = clear.into_iter().zip(solid).map(|(clear, solid)| clear - solid).collect();
         let side = pixels((side, side)).x;
         Some(Self {
             cells,
@@ -72,6 +88,7 @@ impl Clear {
             per_size: 1.0 / pixels((width, height)),
             wrap,
             steps,
+            has_gaps,
             reach: std::array::from_fn(|level| reach(width, level).max(reach(height, level))),
             levels: mipmaps != Mipmaps::None,
             several: minify == Filter::Linear,
@@ -84,14 +101,21 @@ impl Clear {
         self.size
     }
 
-    /// How many texels from each place, in texels, everything is clear on both axes; 0 where that is not known.
+    /// Whether it is clear anywhere.
+    pub(crate) fn has_gaps(&self) -> bool {
+        self.has_gaps
+    }
+
+    /// How many texels from each place, in texels, everything is clear on both axes, or, below 0, solid; 0 where that is not
+    /// known.
     #[inline(always)]
     pub(crate) fn room<const N: usize>(&self, [x, y]: &[[f32; N]; 2]) -> [f32; N] {
-        let (columns, rows) = (self.cells_of(x, 0), self.cells_of(y, 1));
+        let (columns, rows) = (self.cells_at(x, 0), self.cells_at(y, 1));
         let mut room = [0.0; N];
         for (i, room) in room.iter_mut().enumerate() {
             let cell = rows[i] as usize * self.cells[0] + columns[i] as usize;
-            *room = f32::from(self.steps.get(cell).map_or(0, |steps| steps.saturating_sub(1))) * self.side;
+            let steps = self.steps.get(cell).copied().unwrap_or(0);
+            *room = f32::from(steps - steps.signum()) * self.side;
         }
         room
     }
@@ -99,7 +123,7 @@ impl Clear {
     /// The cells of coordinates, in texels, along an axis.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "cast as small numbers")]
-    fn cells_of<const N: usize>(&self, at: &[f32; N], axis: usize) -> [i32; N] {
+    fn cells_at<const N: usize>(&self, at: &[f32; N], axis: usize) -> [i32; N] {
         let (len, per_len, last) = (self.size[axis], self.per_size[axis], self.cells[axis] as i32 - 1);
         let mut inside = *at;
         match self.wrap[axis] {
@@ -141,51 +165,66 @@ fn reach(len: usize, level: usize) -> f32 {
     BESIDE * width(level) + more.sum::<f32>()
 }
 
-/// Which cells have anything in them, of so many texels a side; `None` if all have.
-fn filled(bitmap: &Bitmap, (channel, most): (usize, u8), side: usize, cells: [usize; 2]) -> Option<Vec<bool>> {
-    let filled = match &bitmap.pixels {
+/// Which cells, of so many texels a side, have anything in them that is not clear, and anything that is not solid; `None` of a
+/// map that is the same everywhere.
+fn cells_of(
+    bitmap: &Bitmap,
+    (channel, Codes { most, least }): (usize, Codes),
+    side: usize,
+    cells: [usize; 2],
+) -> Option<[Vec<bool>; 2]> {
+    let grid = (bitmap, side, cells);
+    let all = |code: u16| [code > u16::from(most), code < least];
+    let wide = |code: u16| [code > u16::from(most) * 257, u32::from(code) < u32::from(least) * 257];
+    Some(match &bitmap.pixels {
         Pixels::Rgb8(_) if channel == 3 => return None,
-        Pixels::Rgb8(texels) => cells_with(texels.as_chunks::<3>().0, |t| t[channel] > most, (bitmap, side, cells)),
-        Pixels::Rgba8(texels) => cells_with(texels, |t| t[channel] > most, (bitmap, side, cells)),
-        Pixels::Rgba16(texels) => cells_with(texels, |t| t[channel] > u16::from(most) * 257, (bitmap, side, cells)),
-    };
-    filled.contains(&false).then_some(filled)
+        Pixels::Rgb8(texels) => cells_with(texels.as_chunks::<3>().0, |t| all(t[channel].into()), grid),
+        Pixels::Rgba8(texels) => cells_with(texels, |t| all(t[channel].into()), grid),
+        Pixels::Rgba16(texels) => cells_with(texels, |t| wide(t[channel]), grid),
+    })
 }
 
-/// The cells in which any texel is such.
+/// The cells in which any texel is such, in either way.
 fn cells_with<T>(
     texels: &[T],
-    is_such: impl Fn(&T) -> bool,
+    is_such: impl Fn(&T) -> [bool; 2],
     (bitmap, side, [columns, rows]): (&Bitmap, usize, [usize; 2]),
-) -> Vec<bool> {
-    let mut cells = vec![false; columns * rows];
+) -> [Vec<bool>; 2] {
+    let [mut one, mut other] = [(); 2].map(|()| vec![false; columns * rows]);
     for (y, row) in texels.chunks(bitmap.width as usize).enumerate() {
-        let cells = &mut cells[y / side * columns..][..columns];
-        for (cell, texels) in cells.iter_mut().zip(row.chunks(side)) {
-            *cell |= texels.iter().any(&is_such);
+        let [one, other] = [&mut one, &mut other].map(|cells| &mut cells[y / side * columns..][..columns]);
+        for ((one, other), texels) in one.iter_mut().zip(other).zip(row.chunks(side)) {
+            for such in texels.iter().map(&is_such) {
+                *one |= such[0];
+                *other |= such[1];
+            }
         }
     }
-    cells
+    [one, other]
 }
 
-/// How many steps, along rows, columns or both, each cell is away from one that is filled, at most 255.
-fn steps([columns, rows]: [usize; 2], wrap: [Wrap; 2], filled: &[bool]) -> Vec<u8> {
-    let mut steps: Vec<u8> = filled.iter().map(|&filled| if filled { 0 } else { u8::MAX }).collect();
+/// The most steps that are told.
+const FARTHEST: i8 = i8::MAX;
+
+/// How many steps, along rows, columns or both, each cell is away from one that is filled, at most [`FARTHEST`].
+fn steps([columns, rows]: [usize; 2], wrap: [Wrap; 2], filled: &[bool]) -> Vec<i8> {
+    let mut steps: Vec<i8> = filled.iter().map(|&filled| if filled { 0 } else { FARTHEST }).collect();
     let [around, over] = wrap.map(|wrap| wrap == Wrap::Repeat);
-    let mut beside = vec![u8::MAX; columns + 2];
-    let mut step = |steps: &mut [u8], y: usize, from: Option<usize>| {
+    let mut beside = vec![FARTHEST; columns + 2];
+    let mut step = |steps: &mut [i8], y: usize, from: Option<usize>| {
         if let Some(from) = from {
             let other = &steps[from * columns..][..columns];
             beside[1..=columns].copy_from_slice(other);
-            (beside[0], beside[columns + 1]) = if around { (other[columns - 1], other[0]) } else { (u8::MAX, u8::MAX) };
+            (beside[0], beside[columns + 1]) =
+                if around { (other[columns - 1], other[0]) } else { (FARTHEST, FARTHEST) };
         } else {
-            beside.fill(u8::MAX);
+            beside.fill(FARTHEST);
         }
         let row = &mut steps[y * columns..][..columns];
         for (here, near) in row.iter_mut().zip(beside.windows(3)) {
             *here = (*here).min(near[0].min(near[1]).min(near[2]).saturating_add(1));
         }
-        let before = |row: &[u8], end: usize| if around { row[end] } else { u8::MAX };
+        let before = |row: &[i8], end: usize| if around { row[end] } else { FARTHEST };
         let mut last = before(row, columns - 1);
         for here in row.iter_mut() {
             last = (*here).min(last.saturating_add(1));
@@ -218,11 +257,13 @@ mod tests {
     use super::*;
     use crate::math::random::Random;
     use crate::scene::{Scene, Texture};
+    use std::ops::RangeInclusive;
 
+    const CODES: Codes = Codes { most: 0, least: 200 };
     const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
 
     /// Steps by their definition.
-    fn defined([columns, rows]: [usize; 2], wrap: [Wrap; 2], filled: &[bool]) -> Vec<u8> {
+    fn defined([columns, rows]: [usize; 2], wrap: [Wrap; 2], filled: &[bool]) -> Vec<i8> {
         let apart = |a: usize, b: usize, len: usize, wrap: Wrap| {
             let apart = a.abs_diff(b);
             if wrap == Wrap::Repeat { apart.min(len - apart) } else { apart }
@@ -233,7 +274,7 @@ mod tests {
                 apart(x.0, x.1, columns, wrap[0]).max(apart(y.0, y.1, rows, wrap[1]))
             };
             let nearest = (0..filled.len()).filter(|&other| filled[other]).map(steps).min();
-            nearest.map_or(u8::MAX, |steps| steps.min(255) as u8)
+            nearest.map_or(FARTHEST, |steps| steps.min(127) as i8)
         };
         (0..filled.len()).map(of).collect()
     }
@@ -251,15 +292,20 @@ mod tests {
         }
     }
 
-    /// A map with spots of alpha on it, the other codes up to `most`.
-    fn spotted(random: &mut Random, (width, height): (u32, u32), most: u8, sampler: Sampler) -> Scene {
+    /// A map with an alpha of some codes, and spots of another on it.
+    fn spotted(
+        random: &mut Random,
+        ((width, height), sampler): ((u32, u32), Sampler),
+        (codes, spot): (RangeInclusive<u8>, u8),
+    ) -> Scene {
         let mut texels = vec![[200, 100, 50, 0]; (width * height) as usize];
-        texels.iter_mut().for_each(|texel| texel[3] = random.below(usize::from(most) + 1) as u8);
+        let count = usize::from(codes.end() - codes.start()) + 1;
+        texels.iter_mut().for_each(|texel| texel[3] = codes.start() + random.below(count) as u8);
         for _ in 0..3 {
             let (x, y) = (random.below(width as usize) as u32, random.below(height as usize) as u32);
             for k in 0..4 {
                 let (x, y) = ((x + k % 2).min(width - 1), (y + k / 2).min(height - 1));
-                texels[(y * width + x) as usize][3] = 255;
+                texels[(y * width + x) as usize][3] = spot;
             }
         }
         let pixels = Pixels::Rgba8(texels.into_iter().collect());
@@ -267,16 +313,10 @@ mod tests {
         Scene { textures: vec![Texture { bitmap: 0, sampler }], bitmaps: vec![bitmap], ..Scene::default() }
     }
 
-    #[test]
-    fn what_is_clear_all_around_is_read_as_no_more_than_what_is_stored_there() {
-        let mut random = Random::new(12);
-        let (mut clear_ones, mut all) = (0, 0);
-        for (round, size) in [(64, 64), (128, 32), (37, 50), (100, 64), (1024, 8), (2048, 16), (33, 1)]
-            .into_iter()
-            .cycle()
-            .take(84)
-            .enumerate()
-        {
+    /// Maps of many sizes, read in all ways.
+    fn kinds() -> impl Iterator<Item = ((u32, u32), Sampler)> {
+        let sizes = [(64, 64), (128, 32), (37, 50), (127, 63), (1023, 8), (2048, 16), (33, 1)];
+        sizes.into_iter().cycle().take(84).enumerate().map(|(round, size)| {
             let filter = |k: usize| if k.is_multiple_of(3) { Filter::Nearest } else { Filter::Linear };
             let sampler = Sampler {
                 magnify: filter(round + 1),
@@ -285,10 +325,19 @@ mod tests {
                 wrap_u: WRAPS[round % 3],
                 wrap_v: WRAPS[round / 3 % 3],
             };
+            (size, sampler)
+        })
+    }
+
+    #[test]
+    fn what_is_clear_all_around_is_read_as_no_more_than_what_is_stored_there() {
+        let mut random = Random::new(12);
+        let (mut clear_ones, mut all) = (0, 0);
+        for (round, (size, sampler)) in kinds().enumerate() {
             let most = [0, 100][round % 2];
-            let scene = spotted(&mut random, size, most, sampler);
+            let scene = spotted(&mut random, (size, sampler), (0..=most, 255));
             let store = TextureStore::new(&scene);
-            let clear = Clear::of(&store, 0, 3, most).unwrap();
+            let clear = Survey::of(&store, 0, 3, Codes { most, least: 256 }).unwrap();
             for _ in 0..3000 {
                 let at = Vec2::new(random.unit() * 3.0 - 1.0, random.unit() * 3.0 - 1.0);
                 // From far below a texel to many, round or long, in any direction.
@@ -313,17 +362,44 @@ mod tests {
     }
 
     #[test]
-    fn maps_without_alpha_or_without_a_gap_are_clear_nowhere() {
+    fn what_is_solid_all_around_is_read_as_no_less_than_what_is_stored_there() {
+        let mut random = Random::new(13);
+        let (mut solid_ones, mut all) = (0, 0);
+        for (round, (size, sampler)) in kinds().enumerate() {
+            let least = [255, 128][round % 2];
+            let scene = spotted(&mut random, (size, sampler), (least..=255, least - 1));
+            let store = TextureStore::new(&scene);
+            let solid = Survey::of(&store, 0, 3, Codes { most: 9, least: least.into() }).unwrap();
+            assert!(!solid.has_gaps());
+            for _ in 0..3000 {
+                let at = Vec2::new(random.unit() * 3.0 - 1.0, random.unit() * 3.0 - 1.0);
+                let texels = solid.size();
+                let room = solid.room(&[[at.x * texels.x], [at.y * texels.y]])[0];
+                all += 1;
+                if solid.reach(0.0, 0.0) <= -room {
+                    solid_ones += 1;
+                    let (read, stored) = (store.channel::<3>(0, at), f32::from(least) / 255.0);
+                    let enough = if least == 255 { read == 1.0 } else { read >= stored * (1.0 - 1e-6) };
+                    assert!(enough, "{size:?} {sampler:?} {at}: {read}");
+                }
+            }
+        }
+        assert!(solid_ones > all / 5, "{solid_ones} of {all}");
+    }
+
+    #[test]
+    fn of_maps_without_alpha_or_that_are_between_everywhere_nothing_is_known() {
         let of = |pixels: Pixels, channel: usize| {
             let bitmap = Bitmap { name: String::new(), width: 4, height: 4, pixels };
             let texture = Texture { bitmap: 0, sampler: Sampler::default() };
             let scene = Scene { textures: vec![texture], bitmaps: vec![bitmap], ..Scene::default() };
-            Clear::of(&TextureStore::new(&scene), 0, channel, 0).is_some()
+            Survey::of(&TextureStore::new(&scene), 0, channel, CODES).is_some()
         };
         let rgb = |code: u8| Pixels::Rgb8((0..48).map(|_| code).collect());
-        assert!(!of(rgb(0), 3) && of(rgb(0), 0) && !of(rgb(1), 0));
+        assert!(!of(rgb(0), 3) && of(rgb(0), 0) && !of(rgb(1), 0) && !of(rgb(199), 0) && of(rgb(200), 0));
         let rgba16 = |code: u16| Pixels::Rgba16((0..16).map(|_| [9, 9, 9, code]).collect());
         assert!(of(rgba16(0), 3) && !of(rgba16(1), 3) && !of(rgba16(0), 1));
-        assert!(Clear::of(&TextureStore::new(&Scene::default()), 0, 3, 0).is_none());
+        assert!(of(rgba16(200 * 257), 3) && !of(rgba16(200 * 257 - 1), 3));
+        assert!(Survey::of(&TextureStore::new(&Scene::default()), 0, 3, CODES).is_none());
     }
 }

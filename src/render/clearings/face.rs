@@ -1,0 +1,178 @@
+//! A cut-out face, and where rays meet it: in one line of memory.
+
+use crate::accel::Ray;
+use crate::math::simd::{Kernel, LANES, Simd};
+use crate::math::{DVec2, DVec3, Vec2, Vec3};
+use crate::render::texture::Survey;
+use bytemuck::{Pod, Zeroable};
+
+/// Where a ray goes so much farther along a face than across its cone nothing is known: how wide it is there depends on
+/// roundings.
+const GRAZING: f32 = 50.0;
+
+/// Error of a place on a face that a ray meets under a right angle, in parts of the largest number it is made from; more
+/// than all roundings.
+const ROUNDING: f32 = 4e-6;
+
+/// Nothing is known of a triangle with this part of the area of one of the same edges, or less.
+const SLENDER: f64 = 500.0;
+
+/// Error of coordinates, texels, beside that.
+const BLUR: f32 = 0.05;
+
+/// A face and how coordinates run along it.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub(super) struct Face {
+    /// Outward, of unit length, and where its plane is.
+    normal: Vec3,
+    place: f32,
+    /// How both coordinates grow, texels by world units, and what they are at the origin.
+    along: [Vec3; 2],
+    at: Vec2,
+    /// How fast they grow at most.
+    growth: f32,
+    /// The number of its map, from 1 on; 0: nothing is known.
+    pub(super) map: u32,
+    /// 1 where it is seen from its front alone.
+    one_sided: u32,
+    /// Error of coordinates, texels, by the sizes of the numbers that they are made from.
+    error: f32,
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "what is too large becomes infinite, and is not used")]
+fn narrow(x: f64) -> f32 {
+    x as f32
+}
+
+impl Face {
+    /// That of a triangle with these coordinates, texels, at its corners, to which an offset is added; `None` where they tell
+    /// nothing of use.
+    pub(super) fn new(corners: [Vec3; 3], uv: [Vec2; 3], offset: Vec2, outward: f32) -> Option<Self> {
+        let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+        let (e1, e2) = (b - a, c - a);
+        let normal = e1.cross(e2);
+        let twice = normal.length();
+        // Of slivers rounding makes too much.
+        if e1.length() * e2.length() > twice * SLENDER {
+            return None;
+        }
+        let (second, third) = (e2.cross(normal) / (twice * twice), normal.cross(e1) / (twice * twice));
+        let [first, of_second, of_third] = uv.map(|uv| uv.as_dvec2());
+        let edges = [of_second - first, of_third - first];
+        let along = [0, 1].map(|k: usize| second * edges[0][k] + third * edges[1][k]);
+        let at = first + offset.as_dvec2() - DVec2::new(along[0].dot(a), along[1].dot(a));
+        // The longer axis of the ellipse that a unit circle becomes.
+        let (u, v, both) = (along[0].length_squared(), along[1].length_squared(), along[0].dot(along[1]));
+        let growth = (0.5 * (u + v) + (0.25 * (u - v) * (u - v) + both * both).sqrt()).sqrt();
+        let largest = |v: [DVec3; 3]| v.into_iter().map(|v| v.abs().max_element()).fold(0.0, f64::max);
+        let coordinates = uv.map(|uv| uv.as_dvec2().extend(0.0));
+        let error = growth * largest([a, b, c]) + largest(coordinates) + offset.as_dvec2().abs().max_element();
+        let normal = normal / twice * f64::from(outward);
+        let face = Self {
+            normal: normal.as_vec3(),
+            place: narrow(normal.dot(a)),
+            along: along.map(|along| along.as_vec3()),
+            at: at.as_vec2(),
+            growth: narrow(growth),
+            map: 0,
+            one_sided: 0,
+            error: narrow(error) * ROUNDING,
+        };
+        let is_known = face.growth > 0.0 && (face.growth + face.error + face.place).is_finite();
+        (is_known && face.at.is_finite() && face.normal.is_finite()).then_some(face)
+    }
+
+    /// The same with what cuts it out.
+    pub(super) fn cut_by(self, map: u32, one_sided: bool) -> Self {
+        Self { map, one_sided: one_sided.into(), ..self }
+    }
+
+    /// What is known of where some rays meet the plane; of maps as sharp as they are where cones have no width.
+    #[inline(always)]
+    pub(super) fn sure<const N: usize>(&self, map: &Survey, rays: &Rays<N>) -> Sure {
+        let backs_count = rays.looks & (self.one_sided == 1);
+        let (mut at, mut needed) = ([[0.0; N]; 2], [0.0; N]);
+        for (i, needed) in needed.iter_mut().enumerate() {
+            let [origin, dir] = [&rays.origin, &rays.dir].map(|rows| Vec3::new(rows[0][i], rows[1][i], rows[2][i]));
+            let (slope, length) = (self.normal.dot(dir), dir.length());
+            let t = (self.place - self.normal.dot(origin)) / slope;
+            let position = origin + dir * t;
+            (at[0][i], at[1][i]) = (self.along[0].dot(position) + self.at.x, self.along[1].dot(position) + self.at.y);
+            let longer = length / slope.abs();
+            let [width, spread] = [rays.cone[0][i], rays.cone[1][i]];
+            let largest = origin.abs().max_element() + t.abs() * length + self.place.abs();
+            let largest_at = at[0][i].abs().max(at[1][i].abs());
+            let error = BLUR + self.error + (largest * self.growth * longer + largest_at) * ROUNDING;
+            let across = (width + spread * t) * self.growth;
+            let reach = map.reach(across, across * longer) + error;
+            // Backs of one-sided faces are passed, too, but as something that is there.
+            let unknown = (longer > GRAZING) | (t <= rays.from[i]) | (backs_count & (slope > 0.0));
+            *needed = if unknown { f32::INFINITY } else { reach };
+        }
+        let room = map.room(&at);
+        // False for what is no number.
+        (0..N).fold(Sure { clear: 0, solid: 0 }, |Sure { clear, solid }, i| Sure {
+            clear: clear | u32::from(needed[i] <= room[i]) << i,
+            solid: solid | u32::from(needed[i] <= -room[i]) << i,
+        })
+    }
+}
+
+/// A ray that meets faces.
+#[derive(Clone, Copy)]
+pub(super) struct Sight<'r> {
+    pub(super) ray: &'r Ray,
+    /// Width of its cone at the start, and its growth.
+    pub(super) cone: [f32; 2],
+    /// Where it may meet what it has crossed, or comes from, once more: up to here nothing is passed, for that matters to what
+    /// comes next.
+    pub(super) from: f32,
+}
+
+/// Rays of a mask that meet a face where it is known what is there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sure {
+    /// Those that meet nothing.
+    pub(super) clear: u32,
+    /// Those that meet what is there as a whole, unless they look: that is shaded in any case.
+    pub(super) solid: u32,
+}
+
+/// Rays in lanes.
+pub(super) struct Rays<const N: usize> {
+    origin: [[f32; N]; 3],
+    dir: [[f32; N]; 3],
+    /// Widths of their cones at the start, and their growths.
+    cone: [[f32; N]; 2],
+    from: [f32; N],
+    /// Whether they look, and see fronts alone of what is one-sided.
+    looks: bool,
+}
+
+impl<const N: usize> Rays<N> {
+    #[inline(always)]
+    pub(super) fn new(of: [Sight; N], looks: bool) -> Self {
+        let mut rays = Self { origin: [[0.0; N]; 3], dir: [[0.0; N]; 3], cone: [[0.0; N]; 2], from: [0.0; N], looks };
+        for (i, Sight { ray, cone, from }) in of.into_iter().enumerate() {
+            for k in 0..3 {
+                (rays.origin[k][i], rays.dir[k][i]) = (ray.origin[k], ray.dir[k]);
+            }
+            (rays.cone[0][i], rays.cone[1][i], rays.from[i]) = (cone[0], cone[1], from);
+        }
+        rays
+    }
+}
+
+/// Eight rays that meet a face.
+pub(super) struct Eight<'r>(pub(super) &'r Face, pub(super) &'r Survey, pub(super) Rays<LANES>);
+
+impl Kernel for Eight<'_> {
+    type Output = Sure;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> Sure {
+        let Self(face, map, rays) = self;
+        face.sure(map, &rays)
+    }
+}

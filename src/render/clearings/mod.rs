@@ -1,0 +1,301 @@
+//! Gaps of what is cut out or blended, known without shading: rays pass them on their way. And where it is solid: it stops rays
+//! to lights.
+//!
+//! Most of what rays meet in a tree are the clear parts of its leaves. Where a map is clear as far around as a lookup may read
+//! ([`Survey`]) it need not be read, and the ray need not stop there. What is not that sure is shaded, with the same outcome: a
+//! gap is passed as if it were not there, so that pictures are the same bit by bit. Whoever counts rays hears of all of them.
+
+mod face;
+#[cfg(test)]
+mod tests;
+
+use super::patch::Turn;
+use super::texture::{Codes, Survey, TextureStore};
+use super::wave::{Path, Wave};
+use super::world::{World, code, least_solid};
+use crate::accel::{Gaps, Hit, Ray};
+use crate::math::simd::{LANES, Level};
+use crate::math::{Vec2, Vec4};
+use crate::scene::{AlphaMode, Instance, Material, Mesh, Scene, TextureRef};
+use bytemuck::Zeroable;
+use face::{Eight, Face, Rays, Sight};
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
+
+/// Rays that meet faces before it is worth finding out where maps are clear: some, and one for so many faces, and for so many
+/// texels.
+const ENOUGH: usize = 1 << 12;
+const FACES: usize = 8;
+const TEXELS: usize = 1 << 10;
+
+/// No more faces are looked at.
+const MOST: usize = 1 << 20;
+
+/// So near, in parts of what places are computed from, a surface may be met once more.
+const NEAR: f32 = 1e-3;
+
+/// What of a scene has gaps, and where.
+#[derive(Debug)]
+pub(crate) struct Clearings<'a> {
+    scene: &'a Scene,
+    world: &'a World,
+    textures: &'a TextureStore<'a>,
+    /// By mesh: what cuts it out, and where it has that.
+    cuts: Vec<Option<(Cut<'a>, &'a [Vec2])>>,
+    /// The prims that are faces of such materials, in order, and how many come before each of these runs.
+    runs: Vec<(Range<u32>, usize)>,
+    count: usize,
+    /// So many rays must have met them before it is worth finding out where gaps are.
+    enough: usize,
+    asked: AtomicUsize,
+    taken: AtomicBool,
+    found: OnceLock<Found>,
+}
+
+/// The map that decides where a material is.
+#[derive(Clone, Copy, Debug)]
+struct Cut<'a> {
+    map: &'a TextureRef,
+    channel: usize,
+    /// What is stored there where the material is not, and where all of it is.
+    codes: Codes,
+    one_sided: bool,
+}
+
+#[derive(Debug, Default)]
+struct Found {
+    /// What is known of each map.
+    maps: Vec<Arc<Option<Survey>>>,
+    /// In the order of their prims.
+    faces: Vec<Face>,
+}
+
+impl<'a> Clearings<'a> {
+    /// `None` for a scene in which no map cuts anything out, or so much that it would take long to find out.
+    pub(crate) fn of(scene: &'a Scene, world: &'a World, textures: &'a TextureStore<'a>) -> Option<Self> {
+        let of_materials: Vec<_> = scene.materials.iter().map(Cut::of).collect();
+        if of_materials.iter().all(Option::is_none) || !world.kept.is_empty() {
+            return None;
+        }
+        let of_mesh = |mesh: &'a Mesh| of_materials[mesh.material as usize].and_then(|cut| cut.on(mesh));
+        let cuts: Vec<_> = scene.meshes.iter().map(of_mesh).collect();
+        let of_instance = |(i, instance): (u32, &Instance)| {
+            cuts[instance.mesh as usize].as_ref()?;
+            Some(world.triangles_of(i)).filter(|prims| !prims.is_empty())
+        };
+        let (mut runs, mut count): (Vec<(Range<u32>, usize)>, _) = (Vec::new(), 0);
+        for prims in (0..).zip(&scene.instances).filter_map(of_instance) {
+            let more = prims.len();
+            match runs.last_mut() {
+                Some((last, _)) if last.end == prims.start => last.end = prims.end,
+                _ => runs.push((prims, count)),
+            }
+            count += more;
+        }
+        let mut maps: Vec<u32> = cuts.iter().flatten().map(|(cut, _)| cut.map.texture).collect();
+        maps.sort_unstable();
+        maps.dedup();
+        let texels = maps.into_iter().map(|map| textures.size(map)).map(|size| (size.x * size.y) as usize);
+        let enough = ENOUGH + count / FACES + texels.sum::<usize>() / TEXELS;
+        (count > 0 && count <= MOST).then(|| Self {
+            scene,
+            world,
+            textures,
+            cuts,
+            runs,
+            count,
+            enough,
+            asked: AtomicUsize::new(0),
+            taken: AtomicBool::new(false),
+            found: OnceLock::new(),
+        })
+    }
+
+    /// What rays with these cones around them find.
+    pub(super) fn before<'r>(&'r self, rays: &'r [Ray], cones: Cones<'r>) -> Before<'r, 'a> {
+        Before { clearings: self, rays, cones }
+    }
+
+    /// Whether a ray that looks meets prim `prim`, if it does, where nothing is for certain.
+    fn is_gap(&self, sight: &Sight, prim: u32) -> bool {
+        let known = self.face(prim, 1).filter(|(_, map)| map.has_gaps());
+        known.is_some_and(|(face, map)| face.sure(map, &Rays::new([*sight], true)).clear == 1)
+    }
+
+    /// Whether prim `prim` stops a ray to a light or lets it through where it is met, if it is, of maps as sharp as they are;
+    /// `None` where that is not known.
+    pub(super) fn stops(&self, ray: &Ray, prim: u32) -> Option<bool> {
+        let (face, map) = self.face(prim, 1)?;
+        let sight = Sight { ray, cone: [0.0; 2], from: f32::NEG_INFINITY };
+        let sure = face.sure(map, &Rays::new([sight], false));
+        (sure.clear | sure.solid == 1).then_some(sure.solid == 1)
+    }
+
+    /// What is known of a prim that so many rays meet, and its map.
+    #[inline]
+    fn face(&self, prim: u32, rays: usize) -> Option<(&Face, &Survey)> {
+        let Found { maps, faces } = self.find(rays)?;
+        let (run, before) = self.runs.get(self.runs.partition_point(|(run, _)| run.end <= prim))?;
+        let face = faces.get(before + prim.checked_sub(run.start)? as usize)?;
+        let map = (**maps.get((face.map as usize).checked_sub(1)?)?).as_ref()?;
+        Some((face, map))
+    }
+
+    /// Where gaps are, once it was asked of enough rays, of which these are some.
+    fn find(&self, rays: usize) -> Option<&Found> {
+        if let Some(found) = self.found.get() {
+            return Some(found);
+        }
+        if self.taken.load(Ordering::Relaxed)
+            || self.asked.fetch_add(rays, Ordering::Relaxed) < self.enough
+            || self.taken.swap(true, Ordering::Relaxed)
+        {
+            return None;
+        }
+        Some(self.found.get_or_init(|| self.survey()))
+    }
+
+    fn survey(&self) -> Found {
+        let Self { scene, world, textures, .. } = self;
+        let (mut faces, mut known, mut maps) = (Vec::with_capacity(self.count), Vec::new(), Vec::new());
+        for (instance, placed) in (0..).zip(&scene.instances) {
+            let Some((cut, uvs)) = self.cuts[placed.mesh as usize] else { continue };
+            let what = (cut.map.texture, cut.channel, cut.codes);
+            let map = known.iter().position(|known| *known == what).unwrap_or_else(|| {
+                known.push(what);
+                maps.push(textures.survey(cut.map.texture, cut.channel, cut.codes));
+                maps.len() - 1
+            });
+            let map = map as u32 + 1;
+            let (turn, size) = (Turn::new(&cut.map.transform), textures.size(cut.map.texture));
+            let outward = if world.placement(instance).mirrored { -1.0 } else { 1.0 };
+            for (prim, corners) in world.triangles_of(instance).zip(&scene.meshes[placed.mesh as usize].triangles) {
+                let uv = corners.map(|i| uvs.get(i as usize).map_or(Vec2::NAN, |&uv| turn.apply(uv)) * size);
+                let face = Face::new(world.triangle(prim), uv, cut.map.transform.offset * size, outward);
+                faces.push(face.map_or(Face::zeroed(), |face| face.cut_by(map, cut.one_sided)));
+            }
+        }
+        Found { maps, faces }
+    }
+}
+
+impl<'a> Cut<'a> {
+    fn of(material: &'a Material) -> Option<Self> {
+        let most = most(material)?;
+        let is_number = material.opacity.is_finite() && material.base_color.is_finite();
+        if material.reflection.transmits() || !is_number {
+            return None;
+        }
+        let least = least_solid(material).map_or(Self::NEVER, |least| code(least, 255));
+        // That nothing is there each says by itself, whatever the other says.
+        let (map, channel, least) = match (&material.opacity_map, &material.base_color_map) {
+            (Some(map), Some(_)) => (map, 0, Self::NEVER),
+            (Some(map), None) => (map, 0, least),
+            (None, Some(map)) => (map, 3, least),
+            (None, None) => return None,
+        };
+        Some(Self { map, channel, codes: Codes { most, least }, one_sided: !material.double_sided })
+    }
+
+    /// More than any code.
+    const NEVER: u16 = 256;
+
+    /// The same for a mesh, and where that has the map, if nothing makes it more opaque than it says.
+    fn on(self, mesh: &Mesh) -> Option<(Self, &[Vec2])> {
+        let uvs = mesh.uvs.get(self.map.uv_set as usize)?;
+        let is_part = |color: &Vec4| color.cmpge(Vec4::ZERO).all() && color.cmple(Vec4::ONE).all();
+        let is_whole = mesh.colors.iter().all(|color| color.w == 1.0);
+        let least = if is_whole { self.codes.least } else { Self::NEVER };
+        let cut = Self { codes: Codes { least, ..self.codes }, ..self };
+        mesh.colors.iter().all(is_part).then_some((cut, uvs))
+    }
+}
+
+/// Of 8 bits the highest code of a map with which a material is not there, if there is one.
+fn most(material: &Material) -> Option<u8> {
+    match material.alpha_mode {
+        AlphaMode::Opaque => None,
+        AlphaMode::Blend => Some(0),
+        AlphaMode::Mask { cutoff } => {
+            /// Means in smaller copies are rounded, at most by this.
+            const ROUNDED: f32 = 1e-3;
+            let is_hole = |code: &u8| material.opacity * (f32::from(*code) / 255.0 + ROUNDED) < cutoff;
+            (0..=u8::MAX).take_while(is_hole).last()
+        }
+    }
+}
+
+/// The cones around rays, by number.
+#[derive(Clone, Copy)]
+pub(super) enum Cones<'r> {
+    /// Widths and growths.
+    Eyes([&'r [f32]; 2]),
+    /// What rays carry that start, and what each comes from.
+    Starting(&'r [Path], &'r [Hit]),
+    /// Or that go on.
+    Continuing(&'r [Path]),
+}
+
+impl<'r> From<&'r Wave> for Cones<'r> {
+    fn from(Wave { starts, paths, after, .. }: &'r Wave) -> Self {
+        if *starts { Self::Starting(paths, after) } else { Self::Continuing(paths) }
+    }
+}
+
+/// Rays that look for what is there.
+pub(super) struct Before<'r, 'a> {
+    clearings: &'r Clearings<'a>,
+    rays: &'r [Ray],
+    cones: Cones<'r>,
+}
+
+impl Before<'_, '_> {
+    /// A ray and its cone.
+    #[inline]
+    fn sight(&self, ray: usize) -> Sight<'_> {
+        let of = |path: &Path, before: &Hit| {
+            let Ray { origin, .. } = &self.rays[ray];
+            let near = (before.t.abs() + origin.abs().max_element()) * NEAR;
+            let from = if before.is_some() { before.t + near } else { f32::NEG_INFINITY };
+            (path.cone_width, path.cone_spread, from)
+        };
+        let (width, spread, from) = match self.cones {
+            Cones::Eyes([width, spread]) => (width[ray], spread[ray], f32::NEG_INFINITY),
+            Cones::Starting(paths, after) => of(&paths[ray], &after[ray]),
+            Cones::Continuing(paths) => of(&paths[ray], &paths[ray].crossed),
+        };
+        Sight { ray: &self.rays[ray], cone: [width, spread], from }
+    }
+}
+
+impl Gaps for Before<'_, '_> {
+    fn is_gap(&self, ray: usize, prim: u32) -> bool {
+        self.clearings.is_gap(&self.sight(ray), prim)
+    }
+
+    fn gaps(&self, first: usize, rays: u32, prim: u32) -> u32 {
+        let (mut left, mut passing) = (rays, 0);
+        let known = self.clearings.face(prim, rays.count_ones() as usize);
+        let Some((face, map)) = known.filter(|(_, map)| map.has_gaps()) else { return 0 };
+        while left != 0 {
+            // The next eight, be they neighbours or not.
+            let (mut numbers, mut count) = ([left.trailing_zeros(); LANES], 0);
+            while left != 0 && count < LANES {
+                numbers[count] = left.trailing_zeros();
+                left &= left - 1;
+                count += 1;
+            }
+            let clear = if count == 1 {
+                face.sure(map, &Rays::new([self.sight(first + numbers[0] as usize)], true)).clear
+            } else {
+                let rays = Rays::new(numbers.map(|number| self.sight(first + number as usize)), true);
+                Level::best().run_narrow(Eight(face, map, rays)).clear
+            };
+            for (i, number) in numbers.iter().enumerate().take(count) {
+                passing |= (clear >> i & 1) << number;
+            }
+        }
+        passing
+    }
+}
