@@ -197,6 +197,11 @@ impl Patch<'_> {
         }
     }
 
+    /// A channel of the texture at this point, linear, as sharp as it is stored.
+    pub(crate) fn channel<const CHANNEL: usize>(&self, map: &TextureRef, store: &TextureStore) -> f32 {
+        store.channel::<CHANNEL>(map.texture, self.coordinates(map).uv)
+    }
+
     pub(super) fn coordinates(&self, map: &TextureRef) -> Coordinates {
         match self.last.get() {
             Some((last, at)) if (last.uv_set, last.transform) == (map.uv_set, map.transform) => at,

@@ -20,6 +20,12 @@ const SLENDER: f64 = 500.0;
 /// Error of coordinates, texels, beside that.
 const BLUR: f32 = 0.05;
 
+/// It is seen from its front alone.
+const ONE_SIDED: u32 = 1;
+
+/// Its map is read as sharply as it is stored, whatever a cone covers.
+const SHARP: u32 = 2;
+
 /// A face and how coordinates run along it.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
@@ -34,8 +40,8 @@ pub(super) struct Face {
     growth: f32,
     /// The number of its map, from 1 on; 0: nothing is known.
     pub(super) map: u32,
-    /// 1 where it is seen from its front alone.
-    one_sided: u32,
+    /// Of [`ONE_SIDED`] and [`SHARP`].
+    flags: u32,
     /// Error of coordinates, texels, by the sizes of the numbers that they are made from.
     error: f32,
 }
@@ -76,7 +82,7 @@ impl Face {
             at: at.as_vec2(),
             growth: narrow(growth),
             map: 0,
-            one_sided: 0,
+            flags: 0,
             error: narrow(error) * ROUNDING,
         };
         let is_known = face.growth > 0.0 && (face.growth + face.error + face.place).is_finite();
@@ -84,14 +90,16 @@ impl Face {
     }
 
     /// The same with what cuts it out.
-    pub(super) fn cut_by(self, map: u32, one_sided: bool) -> Self {
-        Self { map, one_sided: one_sided.into(), ..self }
+    pub(super) fn cut_by(self, map: u32, [one_sided, sharp]: [bool; 2]) -> Self {
+        Self { map, flags: u32::from(one_sided) * ONE_SIDED | u32::from(sharp) * SHARP, ..self }
     }
 
-    /// What is known of where some rays meet the plane; of maps as sharp as they are where cones have no width.
+    /// What is known of where some rays meet the plane; of maps as sharp as they are where cones have no width, or
+    /// that are read so.
     #[inline(always)]
     pub(super) fn sure<const N: usize>(&self, map: &Survey, rays: &Rays<N>) -> Sure {
-        let backs_count = rays.looks & (self.one_sided == 1);
+        let backs_count = rays.looks & (self.flags & ONE_SIDED != 0);
+        let growth = if self.flags & SHARP == 0 { self.growth } else { 0.0 };
         let (mut at, mut needed) = ([[0.0; N]; 2], [0.0; N]);
         for (i, needed) in needed.iter_mut().enumerate() {
             let [origin, dir] = [&rays.origin, &rays.dir].map(|rows| Vec3::new(rows[0][i], rows[1][i], rows[2][i]));
@@ -104,7 +112,7 @@ impl Face {
             let largest = origin.abs().max_element() + t.abs() * length + self.place.abs();
             let largest_at = at[0][i].abs().max(at[1][i].abs());
             let error = BLUR + self.error + (largest * self.growth * longer + largest_at) * ROUNDING;
-            let across = (width + spread * t) * self.growth;
+            let across = (width + spread * t) * growth;
             let reach = map.reach(across, across * longer) + error;
             // Backs of one-sided faces are passed, too, but as something that is there.
             let unknown = (longer > GRAZING) | (t <= rays.from[i]) | (backs_count & (slope > 0.0));

@@ -10,6 +10,7 @@ mod face;
 mod tests;
 
 use super::patch::Turn;
+use super::shade::is_cut_out;
 use super::texture::{Codes, Survey, TextureStore};
 use super::wave::{Path, Wave};
 use super::world::{World, code, least_solid};
@@ -61,6 +62,8 @@ struct Cut<'a> {
     /// What is stored there where the material is not, and where all of it is.
     codes: Codes,
     one_sided: bool,
+    /// Whether it is read as sharply as it is.
+    sharp: bool,
 }
 
 #[derive(Debug, Default)]
@@ -173,7 +176,7 @@ impl<'a> Clearings<'a> {
             for (prim, corners) in world.triangles_of(instance).zip(&scene.meshes[placed.mesh as usize].triangles) {
                 let uv = corners.map(|i| uvs.get(i as usize).map_or(Vec2::NAN, |&uv| turn.apply(uv)) * size);
                 let face = Face::new(world.triangle(prim), uv, cut.map.transform.offset * size, outward);
-                faces.push(face.map_or(Face::zeroed(), |face| face.cut_by(map, cut.one_sided)));
+                faces.push(face.map_or(Face::zeroed(), |face| face.cut_by(map, [cut.one_sided, cut.sharp])));
             }
         }
         Found { maps, faces }
@@ -195,7 +198,13 @@ impl<'a> Cut<'a> {
             (None, Some(map)) => (map, 3, least),
             (None, None) => return None,
         };
-        Some(Self { map, channel, codes: Codes { most, least }, one_sided: !material.double_sided })
+        Some(Self {
+            map,
+            channel,
+            codes: Codes { most, least },
+            one_sided: !material.double_sided,
+            sharp: is_cut_out(material),
+        })
     }
 
     /// More than any code.

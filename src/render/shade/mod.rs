@@ -152,13 +152,28 @@ impl Reader<'_> {
         }
     }
 
+    /// A channel of the map, as sharp as it is; 1 where there is no map, or nothing to read it with.
+    fn sharp<const CHANNEL: usize>(&self, map: Option<&TextureRef>) -> f32 {
+        map.zip(self.patch).map_or(1.0, |(map, patch)| patch.channel::<CHANNEL>(map, self.store))
+    }
+
     /// Base colour and opacity: factors × maps × vertex colour.
     pub(crate) fn base(&self, material: &Material) -> Vec4 {
-        let map = self.read(material.base_color_map.as_ref(), base_space(material));
-        let opacity_map = self.linear(material.opacity_map.as_ref()).x;
+        let (base, opacity) = (material.base_color_map.as_ref(), material.opacity_map.as_ref());
+        let map = self.read(base, base_space(material));
         let vertex = self.patch.map_or(Vec4::ONE, Patch::color);
-        base_color(material, map, opacity_map, vertex)
+        if is_cut_out(material) {
+            let map = map.truncate().extend(self.sharp::<3>(base));
+            return base_color(material, map, self.sharp::<0>(opacity), vertex);
+        }
+        base_color(material, map, self.linear(opacity).x, vertex)
     }
+}
+
+/// Whether a material is there or not, by an opacity that is read as sharply as it is stored, however small it is seen: of its
+/// mean over what a cone covers most leaves would be less than their cutoff, and gone, or more, and solid.
+pub(crate) fn is_cut_out(material: &Material) -> bool {
+    matches!(material.alpha_mode, AlphaMode::Mask { .. })
 }
 
 /// What the map of a material's base colour says with its alpha.

@@ -8,7 +8,7 @@ use crate::math::simd::{Kernel, Simd};
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::render::context::{Context, coverage};
 use crate::render::patch::{FrameTurn, Turn, given_tangent, mixed_color, turned_by_texel, turning_of};
-use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, base_space, has_inside, occlusion};
+use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, base_space, has_inside, is_cut_out, occlusion};
 use crate::render::surface::{facing, side_of};
 use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, changes};
 use crate::render::world::Placement;
@@ -60,6 +60,8 @@ struct Group {
     transform: UvTransform,
     turn: Turn,
     stacks: Vec<Stack>,
+    /// Textures by which the material is cut out, and what each is read for.
+    cuts: Vec<(Slot, u32)>,
 }
 
 /// Maps that are read in the same places.
@@ -100,8 +102,14 @@ impl Sheet {
             sheet.group(map)?;
         }
         for (slot, map, space) in maps {
-            let layout = Layout::of(store, map.texture)?;
             let group = sheet.group(map)?;
+            if is_cut_out(material) && matches!(slot, Slot::Base | Slot::Opacity) {
+                sheet.groups[group].cuts.push((slot, map.texture));
+                if let Slot::Opacity = slot {
+                    continue;
+                }
+            }
+            let layout = Layout::of(store, map.texture)?;
             sheet.groups[group].add(layout, (For::Slot(slot), map.texture, space));
             if let Slot::Normal = slot {
                 sheet.normal_map = Some((map.texture, layout));
@@ -133,7 +141,8 @@ impl Sheet {
         let found = self.groups.iter().position(is_same);
         if found.is_none() && self.groups.len() < GROUPS {
             let turn = Turn::new(&map.transform);
-            self.groups.push(Group { uv_set: map.uv_set, transform: map.transform, turn, stacks: Vec::new() });
+            let (uv_set, transform) = (map.uv_set, map.transform);
+            self.groups.push(Group { uv_set, transform, turn, stacks: Vec::new(), cuts: Vec::new() });
             return Some(self.groups.len() - 1);
         }
         found
@@ -184,6 +193,15 @@ impl Group {
                 places.read(store, (*texture, *space), &mut read[..points]);
                 slots.iter().for_each(|&slot| texels[slot as usize] = read);
                 lobes.iter().for_each(|&lobe| of_lobes[lobe].as_chunks_mut().0[start / LANES] = read);
+            }
+        }
+        for &(slot, texture) in &self.cuts {
+            let places = spots.uv[0].iter().zip(&spots.uv[1]).map(|(&u, &v)| Vec2::new(u, v));
+            for (texel, uv) in texels[slot as usize].iter_mut().zip(places).take(points) {
+                match slot {
+                    Slot::Base => texel.w = store.channel::<3>(texture, uv),
+                    _ => texel.x = store.channel::<0>(texture, uv),
+                }
             }
         }
     }

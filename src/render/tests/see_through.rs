@@ -57,6 +57,43 @@ fn absent_texels_and_unseen_backs_are_passed_without_a_trace() {
     assert_eq!(s.alpha(), 1.0);
 }
 
+/// A sheet of which three eighths are there, in stripes, by the alpha or the map of its opacity.
+fn striped(alpha_mode: AlphaMode, by_map: bool, repeats: f32) -> Stage {
+    let mut s = looking_down(9.0);
+    let texels = (0..256 * 256).map(|i| if i % 8 < 3 { [255; 4] } else { [0, 0, 0, if by_map { 255 } else { 0 }] });
+    let pixels = Pixels::Rgba8(texels.collect());
+    s.scene.bitmaps.push(Bitmap { name: String::new(), width: 256, height: 256, pixels });
+    s.scene.textures.push(Texture { bitmap: 0, sampler: Sampler::default() });
+    let map = Some(TextureRef { texture: 0, uv_set: 0, transform: UvTransform::default() });
+    let (base_color_map, opacity_map) = if by_map { (None, map) } else { (map, None) };
+    let uvs = vec![square(0.0, repeats).positions.iter().map(|p| p.truncate()).collect()];
+    let sheet = Material { alpha_mode, base_color_map, opacity_map, ..unlit(Vec3::ONE) };
+    s.mesh(Mesh { uvs, ..square(0.0, 1.0) }, DAffine3::IDENTITY, sheet);
+    s.settings = Settings { width: 8, height: 8, samples: 256, ..s.settings };
+    s
+}
+
+#[test]
+fn of_what_is_cut_out_as_much_is_there_from_afar_as_from_near() {
+    let mask = |cutoff: f32| AlphaMode::Mask { cutoff };
+    for (alpha_mode, by_map) in [(mask(0.5), false), (mask(0.9), true), (mask(0.1), false), (AlphaMode::Blend, false)] {
+        // Pixels cover two stripes and more, up to hundreds, in no step with them.
+        for repeats in [0.27, 2.3, 37.7] {
+            let beauty = striped(alpha_mode, by_map, repeats).render().picture.beauty;
+            let alphas = beauty.iter().map(|pixel| pixel[3]);
+            let least = alphas.clone().fold(1.0, f32::min);
+            let mean = alphas.sum::<f32>() / 64.0;
+            // Between stripes alpha runs from one to the other: half a texel more or less, on both sides.
+            let more = match alpha_mode {
+                AlphaMode::Mask { cutoff } => (1.0 - 2.0 * cutoff) / 8.0,
+                _ => 0.0,
+            };
+            let what = format!("{alpha_mode:?} {by_map} {repeats}: {mean}, {least} at least");
+            assert!((mean - 0.375 - more).abs() < 0.02 && least > 0.15, "{what}");
+        }
+    }
+}
+
 #[test]
 fn a_face_with_the_corners_of_one_that_is_not_there_is_seen() {
     let absent = Material { opacity: 0.4, alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..unlit(Vec3::X) };

@@ -112,7 +112,7 @@ impl<'a> TextureStore<'a> {
 
     /// Number `CHANNEL` of the linear RGBA of `texture` at `uv`, as sharp as it is: that of [`Self::sample`] with a footprint of
     /// zero.
-    pub(super) fn channel<const CHANNEL: usize>(&self, texture: u32, uv: Vec2) -> f32 {
+    pub(in crate::render) fn channel<const CHANNEL: usize>(&self, texture: u32, uv: Vec2) -> f32 {
         let Some((sampler, source)) = self.find(texture) else { return 1.0 };
         source.lookup(ColorSpace::Linear, sampler).channel::<CHANNEL>(uv)
     }
