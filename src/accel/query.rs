@@ -6,7 +6,7 @@
 use super::intersector::{Exact, Intersector};
 use super::probe::{Outcome, Test};
 use super::wave::{ForAny, ForFirst, ForNext, Wave, begin, end};
-use super::{Accel, Hit, Holes, Looking, NO_PRIM, Probe, Ray, Shapes};
+use super::{Accel, Gaps, Hit, Holes, Looking, NO_PRIM, Probe, Ray, Shapes};
 use crate::math::shear::RaySpace;
 use crate::math::simd::LANES;
 use crate::math::triangle::{self, Meeting, Triangle};
@@ -60,6 +60,15 @@ pub trait Goal {
     fn minds(&self, _opaque: bool, _prim: u32) -> bool {
         true
     }
+
+    /// Who knows where prims that are not opaque are not there, if anybody is asked, and the ray's number there.
+    #[inline(always)]
+    fn gaps(&self) -> Option<(&dyn Gaps, usize)> {
+        None
+    }
+
+    /// Whether a hit would be the answer so far.
+    fn is_nearer(&self, t: f32, prim: u32) -> bool;
 
     /// A hit within the ray's range was found that matters; what that means.
     fn offer(&mut self, t: f32, prim: u32) -> Outcome;
@@ -169,7 +178,7 @@ impl<'a, G: Goal> Query<'a, G> {
     #[inline]
     fn offer(&mut self, t: f32, prim: u32) -> Outcome {
         if t >= self.t_min && t <= self.t_max {
-            if G::ANY && !self.goal.minds(self.is_opaque(prim), prim) {
+            if G::ANY && !self.goal.minds(self.is_opaque(prim), prim) || !G::ANY && self.passes(t, prim) {
                 return Outcome::LetThrough;
             }
             self.goal.offer(t, prim)
@@ -178,6 +187,13 @@ impl<'a, G: Goal> Query<'a, G> {
         } else {
             Outcome::OutOfRange
         }
+    }
+
+    /// Whether a hit that would be the answer is one with a gap.
+    #[inline]
+    fn passes(&self, t: f32, prim: u32) -> bool {
+        let Some((gaps, ray)) = self.goal.gaps() else { return false };
+        !self.is_opaque(prim) && self.goal.is_nearer(t, prim) && gaps.is_gap(ray, prim)
     }
 
     /// Whether a prim stops light wherever it is met.
@@ -320,17 +336,28 @@ impl<'a, G: Goal> Query<'a, G> {
 }
 
 /// The first hit.
-pub struct Closest<I> {
+pub struct Closest<'w, I> {
     best: (f32, u32),
+    /// Who knows of gaps, if anybody does, and the ray's number there.
+    gaps: Option<&'w dyn Gaps>,
+    ray: usize,
     test: I,
 }
 
-impl<I: Intersector> Goal for Closest<I> {
+impl<I: Intersector> Goal for Closest<'_, I> {
     type Test = I;
 
+    #[inline(always)]
+    fn gaps(&self) -> Option<(&dyn Gaps, usize)> {
+        Some((self.gaps?, self.ray))
+    }
+    #[inline]
+    fn is_nearer(&self, t: f32, prim: u32) -> bool {
+        (t, prim) < self.best
+    }
     #[inline]
     fn offer(&mut self, t: f32, prim: u32) -> Outcome {
-        if (t, prim) < self.best {
+        if self.is_nearer(t, prim) {
             self.best = (t, prim);
             return Outcome::Hit;
         }
@@ -372,6 +399,10 @@ impl<I: Intersector> Goal for Occluded<'_, I> {
         opaque || self.holes.is_some_and(|holes| holes.stops(self.ray, prim))
     }
     #[inline]
+    fn is_nearer(&self, _t: f32, _prim: u32) -> bool {
+        !self.found
+    }
+    #[inline]
     fn offer(&mut self, _t: f32, _prim: u32) -> Outcome {
         self.found = true;
         Outcome::Hit
@@ -391,14 +422,22 @@ impl<I: Intersector> Goal for Occluded<'_, I> {
 }
 
 /// The first hit after another.
-pub struct Next<I> {
+pub struct Next<'w, I> {
     after: (f32, u32),
-    closest: Closest<I>,
+    closest: Closest<'w, I>,
 }
 
-impl<I: Intersector> Goal for Next<I> {
+impl<I: Intersector> Goal for Next<'_, I> {
     type Test = I;
 
+    #[inline(always)]
+    fn gaps(&self) -> Option<(&dyn Gaps, usize)> {
+        self.closest.gaps()
+    }
+    #[inline]
+    fn is_nearer(&self, t: f32, prim: u32) -> bool {
+        (t, prim) > self.after && self.closest.is_nearer(t, prim)
+    }
     #[inline]
     fn offer(&mut self, t: f32, prim: u32) -> Outcome {
         if (t, prim) > self.after { self.closest.offer(t, prim) } else { Outcome::OutOfRange }
@@ -417,14 +456,20 @@ impl<I: Intersector> Goal for Next<I> {
     }
 }
 
-impl<I> Closest<I> {
+impl<'w, I> Closest<'w, I> {
     pub(super) fn nothing(test: I) -> Self {
-        Self { best: (f32::INFINITY, NO_PRIM), test }
+        Self::before(&Hit::MISS, test)
     }
 
     /// The first hit, if it comes before one that is known.
     pub(super) fn before(known: &Hit, test: I) -> Self {
-        Self { best: (known.t, known.prim), test }
+        Self { best: (known.t, known.prim), gaps: None, ray: 0, test }
+    }
+
+    /// The same of the ray of this number, which passes gaps, if anybody knows of any.
+    #[inline(always)]
+    pub(super) fn passing(self, gaps: Option<&'w dyn Gaps>, ray: usize) -> Self {
+        Self { gaps, ray, ..self }
     }
 }
 
@@ -436,14 +481,10 @@ impl<'w, I> Occluded<'w, I> {
     }
 }
 
-impl<I> Next<I> {
-    pub(super) fn nothing(after: &Hit, test: I) -> Self {
-        Self { after: (after.t, after.prim), closest: Closest::nothing(test) }
-    }
-
-    /// The first hit after one, if it comes before another that is known.
-    pub(super) fn between(after: &Hit, known: &Hit, test: I) -> Self {
-        Self { after: (after.t, after.prim), closest: Closest::before(known, test) }
+impl<'w, I> Next<'w, I> {
+    /// What a search for the first hit finds, if it comes after another.
+    pub(super) fn after(after: &Hit, closest: Closest<'w, I>) -> Self {
+        Self { after: (after.t, after.prim), closest }
     }
 }
 

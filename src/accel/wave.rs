@@ -110,8 +110,8 @@ pub(super) struct ForFirst<'w, I> {
     pub test: I,
 }
 
-impl<I: Intersector> Wave for ForFirst<'_, I> {
-    type Goal = Closest<I>;
+impl<'w, I: Intersector> Wave for ForFirst<'w, I> {
+    type Goal = Closest<'w, I>;
 
     #[inline(always)]
     fn rays(&self) -> &[Ray] {
@@ -142,8 +142,8 @@ impl<I: Intersector> Wave for ForFirst<'_, I> {
     }
 
     #[inline(always)]
-    fn goal(&self, _: usize) -> Closest<I> {
-        Closest::nothing(self.test)
+    fn goal(&self, i: usize) -> Closest<'w, I> {
+        Closest::nothing(self.test).passing(self.gaps, i)
     }
 
     #[inline(always)]
@@ -157,7 +157,7 @@ impl<I: Intersector> Wave for ForFirst<'_, I> {
     }
 
     #[inline]
-    fn answer(&mut self, i: usize, query: &Query<Closest<I>>) -> bool {
+    fn answer(&mut self, i: usize, query: &Query<Closest<'w, I>>) -> bool {
         self.hits[i] = query.hit();
         self.hits[i].is_some()
     }
@@ -209,8 +209,8 @@ pub(super) struct ForNext<'w, I> {
     pub test: I,
 }
 
-impl<I: Intersector> Wave for ForNext<'_, I> {
-    type Goal = Next<I>;
+impl<'w, I: Intersector> Wave for ForNext<'w, I> {
+    type Goal = Next<'w, I>;
 
     #[inline(always)]
     fn rays(&self) -> &[Ray] {
@@ -235,8 +235,8 @@ impl<I: Intersector> Wave for ForNext<'_, I> {
     }
 
     #[inline(always)]
-    fn goal(&self, i: usize) -> Next<I> {
-        Next::nothing(&self.after[i], self.test)
+    fn goal(&self, i: usize) -> Next<'w, I> {
+        Next::after(&self.after[i], Closest::nothing(self.test).passing(self.gaps, i))
     }
 
     #[inline(always)]
@@ -250,7 +250,7 @@ impl<I: Intersector> Wave for ForNext<'_, I> {
     }
 
     #[inline]
-    fn answer(&mut self, i: usize, query: &Query<Next<I>>) -> bool {
+    fn answer(&mut self, i: usize, query: &Query<Next<'w, I>>) -> bool {
         self.hits[i] = query.hit();
         self.hits[i].is_some()
     }

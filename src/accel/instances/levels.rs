@@ -8,7 +8,7 @@ use crate::accel::slabs::BoxRay;
 use crate::accel::stats::listed_once;
 use crate::accel::wide::split::Item;
 use crate::accel::wide::{Splitting, Stack};
-use crate::accel::{Accel, Hit, Holes, Looking, NO_PRIM, Probe, Ray, Shapes, StructureStats, Wide};
+use crate::accel::{Accel, Gaps, Hit, Holes, Looking, NO_PRIM, Probe, Ray, Shapes, StructureStats, Wide};
 use crate::math::aabb::Aabb;
 use rayon::prelude::*;
 
@@ -176,15 +176,25 @@ impl<'a> TwoLevel<'a> {
     }
 }
 
-/// Prims by the numbers that they have in the tree of what is stored.
-struct Numbered<'a> {
+/// Who is asked of prims by the numbers that they have in the tree of what is stored, and knows them by those of the scene.
+struct Numbered<'a, T: ?Sized> {
     kept: &'a Kept,
-    holes: &'a dyn Holes,
+    of: &'a T,
 }
 
-impl Holes for Numbered<'_> {
+impl Holes for Numbered<'_, dyn Holes + '_> {
     fn stops(&self, ray: usize, prim: u32) -> bool {
-        self.holes.stops(ray, self.kept.number(prim))
+        self.of.stops(ray, self.kept.number(prim))
+    }
+}
+
+impl Gaps for Numbered<'_, dyn Gaps + '_> {
+    fn is_gap(&self, ray: usize, prim: u32) -> bool {
+        self.of.is_gap(ray, self.kept.number(prim))
+    }
+
+    fn gaps(&self, first: usize, rays: u32, prim: u32) -> u32 {
+        self.of.gaps(first, rays, self.kept.number(prim))
     }
 }
 
@@ -203,18 +213,25 @@ impl Accel for TwoLevel<'_> {
     }
 
     fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut LevelScratch, probe: &mut P) {
-        let rays = looking.rays;
+        let Looking { rays, after, gaps, .. } = *looking;
         self.renumber(rays, &mut scratch.rays);
-        let Some(after) = looking.after else {
-            self.stored.closest(&scratch.rays, hits, &mut scratch.stored, probe);
-            return self.go_on(rays, hits, scratch, probe, |i, known| (rays[i].t_min, Closest::before(known, Exact)));
-        };
         scratch.after.clear();
-        scratch.after.extend(after.iter().map(|after| self.after(after)));
-        self.stored.next(&scratch.rays, &scratch.after, hits, &mut scratch.stored, probe);
-        self.go_on(rays, hits, scratch, probe, |i, known| {
-            (rays[i].t_min.max(after[i].t), Next::between(&after[i], known, Exact))
-        });
+        scratch.after.extend(after.into_iter().flatten().map(|after| self.after(after)));
+        let numbered = gaps.map(|of| Numbered { kept: self.kept, of });
+        let stored = Looking {
+            rays: &scratch.rays,
+            pencil: None,
+            after: after.is_some().then_some(&scratch.after),
+            gaps: numbered.as_ref().map(|gaps| gaps as &dyn Gaps),
+        };
+        self.stored.look(&stored, hits, &mut scratch.stored, probe);
+        let before = |i: usize, known: &Hit| Closest::before(known, Exact).passing(gaps, i);
+        match after {
+            None => self.go_on(rays, hits, scratch, probe, |i, known| (rays[i].t_min, before(i, known))),
+            Some(after) => self.go_on(rays, hits, scratch, probe, |i, known| {
+                (rays[i].t_min.max(after[i].t), Next::after(&after[i], before(i, known)))
+            }),
+        }
     }
 
     fn blocked<P: Probe>(
@@ -226,7 +243,7 @@ impl Accel for TwoLevel<'_> {
         probe: &mut P,
     ) {
         self.renumber(rays, &mut scratch.rays);
-        let numbered = holes.map(|holes| Numbered { kept: self.kept, holes });
+        let numbered = holes.map(|of| Numbered { kept: self.kept, of });
         let stored = numbered.as_ref().map(|holes| holes as &dyn Holes);
         self.stored.blocked(&scratch.rays, stored, blocked, &mut scratch.stored, probe);
         for (i, (ray, blocked)) in rays.iter().zip(blocked).enumerate().filter(|(_, (_, blocked))| !**blocked) {

@@ -253,7 +253,7 @@ fn the_next_hit_before_all_is_the_first() {
 }
 
 #[test]
-#[should_panic(expected = "a hit for each ray")]
+#[should_panic(expected = "a hit before and after for each ray")]
 fn answers_that_are_fewer_than_rays_are_a_mistake() {
     let shapes = scenes::mix();
     let accel = AnyAccel::build(AccelKind::DEFAULT, &shapes, &AccelParams::DEFAULT);

@@ -13,7 +13,7 @@ use super::patch::Turn;
 use super::shade::is_cut_out;
 use super::texture::{Codes, Survey, TextureStore};
 use super::wave::{Path, Wave};
-use super::world::{World, code, least_solid};
+use super::world::{PrimSource, World, code, least_solid};
 use crate::accel::{Gaps, Hit, Ray};
 use crate::math::simd::{LANES, Level};
 use crate::math::{Vec2, Vec4};
@@ -42,9 +42,10 @@ pub(crate) struct Clearings<'a> {
     scene: &'a Scene,
     world: &'a World,
     textures: &'a TextureStore<'a>,
-    /// By mesh: what cuts it out, and where it has that.
-    cuts: Vec<Option<(Cut<'a>, &'a [Vec2])>>,
-    /// The prims that are faces of such materials, in order, and how many come before each of these runs.
+    /// By mesh.
+    sheets: Vec<Option<Sheet<'a>>>,
+    /// The prims that are faces of sheets and stored, in order, and how many come before each of these runs; none where they
+    /// are too many.
     runs: Vec<(Range<u32>, usize)>,
     count: usize,
     /// So many rays must have met them before it is worth finding out where gaps are.
@@ -66,26 +67,42 @@ struct Cut<'a> {
     sharp: bool,
 }
 
+/// A mesh that a map cuts out.
+#[derive(Clone, Copy, Debug)]
+struct Sheet<'a> {
+    cut: Cut<'a>,
+    mesh: &'a Mesh,
+    uvs: &'a [Vec2],
+    turn: Turn,
+    /// Texels along both axes of the map.
+    texels: Vec2,
+}
+
 #[derive(Debug, Default)]
 struct Found {
     /// What is known of each map.
     maps: Vec<Arc<Option<Survey>>>,
-    /// In the order of their prims.
+    /// The number of the map of each mesh among them, if it has one.
+    of_meshes: Vec<Option<u32>>,
+    /// In the order of the runs.
     faces: Vec<Face>,
 }
 
 impl<'a> Clearings<'a> {
-    /// `None` for a scene in which no map cuts anything out, or so much that it would take long to find out.
+    /// `None` for a scene in which no map cuts anything out.
     pub(crate) fn of(scene: &'a Scene, world: &'a World, textures: &'a TextureStore<'a>) -> Option<Self> {
         let of_materials: Vec<_> = scene.materials.iter().map(Cut::of).collect();
-        if of_materials.iter().all(Option::is_none) || !world.kept.is_empty() {
+        if of_materials.iter().all(Option::is_none) {
             return None;
         }
-        let of_mesh = |mesh: &'a Mesh| of_materials[mesh.material as usize].and_then(|cut| cut.on(mesh));
-        let cuts: Vec<_> = scene.meshes.iter().map(of_mesh).collect();
+        let of_mesh = |mesh: &'a Mesh| of_materials[mesh.material as usize].and_then(|cut| cut.on(mesh, textures));
+        let sheets: Vec<_> = scene.meshes.iter().map(of_mesh).collect();
+        if sheets.iter().all(Option::is_none) {
+            return None;
+        }
         let of_instance = |(i, instance): (u32, &Instance)| {
-            cuts[instance.mesh as usize].as_ref()?;
-            Some(world.triangles_of(i)).filter(|prims| !prims.is_empty())
+            sheets[instance.mesh as usize].as_ref()?;
+            Some(world.triangles_of(i)).filter(|prims| !prims.is_empty() && world.is_stored(prims.start))
         };
         let (mut runs, mut count): (Vec<(Range<u32>, usize)>, _) = (Vec::new(), 0);
         for prims in (0..).zip(&scene.instances).filter_map(of_instance) {
@@ -96,16 +113,19 @@ impl<'a> Clearings<'a> {
             }
             count += more;
         }
-        let mut maps: Vec<u32> = cuts.iter().flatten().map(|(cut, _)| cut.map.texture).collect();
+        if count > MOST {
+            (runs, count) = (Vec::new(), 0);
+        }
+        let mut maps: Vec<u32> = sheets.iter().flatten().map(|sheet| sheet.cut.map.texture).collect();
         maps.sort_unstable();
         maps.dedup();
         let texels = maps.into_iter().map(|map| textures.size(map)).map(|size| (size.x * size.y) as usize);
         let enough = ENOUGH + count / FACES + texels.sum::<usize>() / TEXELS;
-        (count > 0 && count <= MOST).then(|| Self {
+        Some(Self {
             scene,
             world,
             textures,
-            cuts,
+            sheets,
             runs,
             count,
             enough,
@@ -137,12 +157,25 @@ impl<'a> Clearings<'a> {
 
     /// What is known of a prim that so many rays meet, and its map.
     #[inline]
-    fn face(&self, prim: u32, rays: usize) -> Option<(&Face, &Survey)> {
-        let Found { maps, faces } = self.find(rays)?;
-        let (run, before) = self.runs.get(self.runs.partition_point(|(run, _)| run.end <= prim))?;
-        let face = faces.get(before + prim.checked_sub(run.start)? as usize)?;
-        let map = (**maps.get((face.map as usize).checked_sub(1)?)?).as_ref()?;
+    fn face(&self, prim: u32, rays: usize) -> Option<(Face, &Survey)> {
+        let found = self.find(rays)?;
+        let run = self.runs.get(self.runs.partition_point(|(run, _)| run.end <= prim));
+        let stored = run.filter(|(run, _)| run.start <= prim);
+        let face = match stored {
+            Some((run, before)) => *found.faces.get(before + (prim - run.start) as usize)?,
+            None => self.elsewhere(found, prim)?,
+        };
+        let map = (**found.maps.get((face.map as usize).checked_sub(1)?)?).as_ref()?;
         Some((face, map))
+    }
+
+    /// That of a prim that is not among the runs.
+    #[inline(never)]
+    fn elsewhere(&self, found: &Found, prim: u32) -> Option<Face> {
+        let PrimSource::Triangle { instance, triangle } = self.world.source(prim) else { return None };
+        let mesh = self.scene.instances[instance as usize].mesh as usize;
+        let (sheet, map) = (self.sheets[mesh].as_ref()?, found.of_meshes[mesh]?);
+        sheet.face(self.world, (instance, triangle, prim), map)
     }
 
     /// Where gaps are, once it was asked of enough rays, of which these are some.
@@ -161,25 +194,38 @@ impl<'a> Clearings<'a> {
 
     fn survey(&self) -> Found {
         let Self { scene, world, textures, .. } = self;
-        let (mut faces, mut known, mut maps) = (Vec::with_capacity(self.count), Vec::new(), Vec::new());
-        for (instance, placed) in (0..).zip(&scene.instances) {
-            let Some((cut, uvs)) = self.cuts[placed.mesh as usize] else { continue };
+        let (mut known, mut maps) = (Vec::new(), Vec::new());
+        let mut map_of = |cut: &Cut| {
             let what = (cut.map.texture, cut.channel, cut.codes);
-            let map = known.iter().position(|known| *known == what).unwrap_or_else(|| {
+            known.iter().position(|known| *known == what).unwrap_or_else(|| {
                 known.push(what);
                 maps.push(textures.survey(cut.map.texture, cut.channel, cut.codes));
                 maps.len() - 1
-            });
-            let map = map as u32 + 1;
-            let (turn, size) = (Turn::new(&cut.map.transform), textures.size(cut.map.texture));
-            let outward = if world.placement(instance).mirrored { -1.0 } else { 1.0 };
-            for (prim, corners) in world.triangles_of(instance).zip(&scene.meshes[placed.mesh as usize].triangles) {
-                let uv = corners.map(|i| uvs.get(i as usize).map_or(Vec2::NAN, |&uv| turn.apply(uv)) * size);
-                let face = Face::new(world.triangle(prim), uv, cut.map.transform.offset * size, outward);
-                faces.push(face.map_or(Face::zeroed(), |face| face.cut_by(map, [cut.one_sided, cut.sharp])));
-            }
+            })
+        };
+        let of_meshes: Vec<_> = self.sheets.iter().map(|sheet| Some(map_of(&sheet.as_ref()?.cut) as u32)).collect();
+        let mut faces = Vec::with_capacity(self.count);
+        let all = (0..).zip(&scene.instances).map(|(i, instance)| (i, instance, world.triangles_of(i)));
+        for (i, Instance { mesh, .. }, prims) in all {
+            let is_in_runs = !self.runs.is_empty() && !prims.is_empty() && world.is_stored(prims.start);
+            let sheet = self.sheets[*mesh as usize].as_ref().zip(of_meshes[*mesh as usize]).filter(|_| is_in_runs);
+            let Some((sheet, map)) = sheet else { continue };
+            let face = |(triangle, prim)| sheet.face(world, (i, triangle, prim), map).unwrap_or(Face::zeroed());
+            faces.extend((0..).zip(prims).map(face));
         }
-        Found { maps, faces }
+        Found { maps, of_meshes, faces }
+    }
+}
+
+impl Sheet<'_> {
+    /// The face of a triangle of an instance, a prim, on a map of this number.
+    fn face(&self, world: &World, (instance, triangle, prim): (u32, u32, u32), map: u32) -> Option<Face> {
+        let Self { cut, mesh, uvs, turn, texels } = *self;
+        let corner = |i: u32| uvs.get(i as usize).map_or(Vec2::NAN, |&uv| turn.apply(uv) * texels);
+        let uv = mesh.triangles[triangle as usize].map(corner);
+        let outward = if world.placement(instance).mirrored { -1.0 } else { 1.0 };
+        let face = Face::new(world.triangle(prim), uv, cut.map.transform.offset * texels, outward)?;
+        Some(face.cut_by(map + 1, [cut.one_sided, cut.sharp]))
     }
 }
 
@@ -210,14 +256,15 @@ impl<'a> Cut<'a> {
     /// More than any code.
     const NEVER: u16 = 256;
 
-    /// The same for a mesh, and where that has the map, if nothing makes it more opaque than it says.
-    fn on(self, mesh: &Mesh) -> Option<(Self, &[Vec2])> {
+    /// A mesh that it cuts out, if that has the map, and nothing makes it more opaque than that says.
+    fn on(self, mesh: &'a Mesh, textures: &TextureStore) -> Option<Sheet<'a>> {
         let uvs = mesh.uvs.get(self.map.uv_set as usize)?;
         let is_part = |color: &Vec4| color.cmpge(Vec4::ZERO).all() && color.cmple(Vec4::ONE).all();
         let is_whole = mesh.colors.iter().all(|color| color.w == 1.0);
         let least = if is_whole { self.codes.least } else { Self::NEVER };
         let cut = Self { codes: Codes { least, ..self.codes }, ..self };
-        mesh.colors.iter().all(is_part).then_some((cut, uvs))
+        let (turn, texels) = (Turn::new(&self.map.transform), textures.size(self.map.texture));
+        mesh.colors.iter().all(is_part).then_some(Sheet { cut, mesh, uvs, turn, texels })
     }
 }
 
@@ -299,7 +346,7 @@ impl Gaps for Before<'_, '_> {
                 face.sure(map, &Rays::new([self.sight(first + numbers[0] as usize)], true)).clear
             } else {
                 let rays = Rays::new(numbers.map(|number| self.sight(first + number as usize)), true);
-                Level::best().run_narrow(Eight(face, map, rays)).clear
+                Level::best().run_narrow(Eight(&face, map, rays)).clear
             };
             for (i, number) in numbers.iter().enumerate().take(count) {
                 passing |= (clear >> i & 1) << number;

@@ -222,6 +222,11 @@ impl World {
         self.first_triangle[instance as usize]..self.first_triangle[instance as usize + 1]
     }
 
+    /// Whether prim `prim` is stored by itself, and not once for all places where it stands.
+    pub(crate) fn is_stored(&self, prim: u32) -> bool {
+        matches!(self.kept.find(prim), Spot::Stored(_))
+    }
+
     /// What prim `prim` came from; of a number below [`Self::len`], others mean nothing.
     pub fn source(&self, prim: u32) -> PrimSource {
         let (triangles, polygons) = (self.triangles(), index(self.shapes.polygons.len()));
