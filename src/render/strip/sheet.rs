@@ -196,11 +196,14 @@ impl Group {
             }
         }
         for &(slot, texture) in &self.cuts {
-            let places = spots.uv[0].iter().zip(&spots.uv[1]).map(|(&u, &v)| Vec2::new(u, v));
-            for (texel, uv) in texels[slot as usize].iter_mut().zip(places).take(points) {
+            let read = match slot {
+                Slot::Base => store.channels::<3, LANES>(texture, &spots.uv, points),
+                _ => store.channels::<0, LANES>(texture, &spots.uv, points),
+            };
+            for (texel, read) in texels[slot as usize].iter_mut().zip(read) {
                 match slot {
-                    Slot::Base => texel.w = store.channel::<3>(texture, uv),
-                    _ => texel.x = store.channel::<0>(texture, uv),
+                    Slot::Base => texel.w = read,
+                    _ => texel.x = read,
                 }
             }
         }

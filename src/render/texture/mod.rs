@@ -113,8 +113,26 @@ impl<'a> TextureStore<'a> {
     /// Number `CHANNEL` of the linear RGBA of `texture` at `uv`, as sharp as it is: that of [`Self::sample`] with a footprint of
     /// zero.
     pub(in crate::render) fn channel<const CHANNEL: usize>(&self, texture: u32, uv: Vec2) -> f32 {
-        let Some((sampler, source)) = self.find(texture) else { return 1.0 };
-        source.lookup(ColorSpace::Linear, sampler).channel::<CHANNEL>(uv)
+        let [read] = self.channels::<CHANNEL, 1>(texture, &[[uv.x], [uv.y]], 1);
+        read
+    }
+
+    /// The same at the first `count` of some places, by axis.
+    #[inline(always)]
+    pub(in crate::render) fn channels<const CHANNEL: usize, const N: usize>(
+        &self,
+        texture: u32,
+        uv: &[[f32; N]; 2],
+        count: usize,
+    ) -> [f32; N] {
+        let Some((sampler, source)) = self.find(texture) else { return [1.0; N] };
+        let lookup = source.lookup(ColorSpace::Linear, sampler);
+        match &source.bitmap.pixels {
+            Pixels::Rgb8(_) if CHANNEL == 3 => [1.0; N],
+            Pixels::Rgb8(texels) => lookup.sharp(uv, count, |i| decode::unit8(texels[3 * i + CHANNEL])),
+            Pixels::Rgba8(texels) => lookup.sharp(uv, count, |i| decode::unit8(texels[i][CHANNEL])),
+            Pixels::Rgba16(texels) => lookup.sharp(uv, count, |i| decode::unit16(texels[i][CHANNEL])),
+        }
     }
 
     /// How much linear texels change from `uv` to `reach` times each of two ways, which span a footprint as in [`Self::sample`]:
@@ -200,14 +218,14 @@ impl<'a> Lookup<'a> {
         self.read(plan, &Probes { uv, axis, count })
     }
 
-    fn channel<const CHANNEL: usize>(&self, uv: Vec2) -> f32 {
-        let tap = || self.tap(size_of(self.bitmap), uv, self.sampler.magnify);
-        match &self.bitmap.pixels {
-            Pixels::Rgb8(_) if CHANNEL == 3 => 1.0,
-            Pixels::Rgb8(texels) => tap().read(|i| decode::unit8(texels[3 * i + CHANNEL])),
-            Pixels::Rgba8(texels) => tap().read(|i| decode::unit8(texels[i][CHANNEL])),
-            Pixels::Rgba16(texels) => tap().read(|i| decode::unit16(texels[i][CHANNEL])),
+    /// A number of the texels, as sharp as they are, at the first `count` of some places.
+    #[inline(always)]
+    fn sharp<const N: usize>(&self, [u, v]: &[[f32; N]; 2], count: usize, texel: impl Fn(usize) -> f32) -> [f32; N] {
+        let (size, mut read) = (size_of(self.bitmap), [1.0; N]);
+        for (read, (&u, &v)) in read.iter_mut().zip(u.iter().zip(v)).take(count) {
+            *read = self.tap(size, Vec2::new(u, v), self.sampler.magnify).read(&texel);
         }
+        read
     }
 
     fn changes(&self, uv: Vec2, ways: [Vec2; 2], reach: f32) -> [Vec4; 2] {
