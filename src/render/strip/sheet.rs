@@ -195,16 +195,22 @@ impl Group {
                 lobes.iter().for_each(|&lobe| of_lobes[lobe].as_chunks_mut().0[start / LANES] = read);
             }
         }
+        if !self.cuts.is_empty() {
+            self.cut(store, spots, texels, points);
+        }
+    }
+
+    /// Reads the numbers that cut the material out at so many of these spots.
+    #[inline(never)]
+    fn cut(&self, store: &TextureStore, spots: &Spots, texels: &mut Texels, points: usize) {
         for &(slot, texture) in &self.cuts {
-            let read = match slot {
-                Slot::Base => store.channels::<3, LANES>(texture, &spots.uv, points),
-                _ => store.channels::<0, LANES>(texture, &spots.uv, points),
-            };
-            for (texel, read) in texels[slot as usize].iter_mut().zip(read) {
-                match slot {
-                    Slot::Base => texel.w = read,
-                    _ => texel.x = read,
-                }
+            let texels = &mut texels[slot as usize];
+            if let Slot::Base = slot {
+                let alphas = store.channels::<3, LANES>(texture, &spots.uv, points);
+                texels.iter_mut().zip(alphas).for_each(|(texel, alpha)| texel.w = alpha);
+            } else {
+                let opacities = store.channels::<0, LANES>(texture, &spots.uv, points);
+                texels.iter_mut().zip(opacities).for_each(|(texel, opacity)| texel.x = opacity);
             }
         }
     }
