@@ -20,17 +20,16 @@ use crate::math::{Vec2, Vec4};
 use crate::scene::{AlphaMode, Instance, Material, Mesh, Scene, TextureRef};
 use bytemuck::Zeroable;
 use face::{Eight, Face, Rays, Sight};
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// Rays that meet faces before it is worth finding out where maps are clear: some, and one for so many faces, and for so many
-/// texels.
+/// Rays that meet faces before it is worth finding out where maps are clear: some, and one for so many texels.
 const ENOUGH: usize = 1 << 12;
-const FACES: usize = 8;
-const TEXELS: usize = 1 << 10;
+const TEXELS: usize = 1 << 8;
 
-/// No more faces are looked at.
+/// More faces than these are not kept: each is found anew when it is met.
 const MOST: usize = 1 << 20;
 
 /// So near, in parts of what places are computed from, a surface may be met once more.
@@ -44,15 +43,46 @@ pub(crate) struct Clearings<'a> {
     textures: &'a TextureStore<'a>,
     /// By mesh.
     sheets: Vec<Option<Sheet<'a>>>,
-    /// The prims that are faces of sheets and stored, in order, and how many come before each of these runs; none where they
-    /// are too many.
+    /// The prims that are faces of sheets and stored, in order, and how many come before each of these runs.
     runs: Vec<(Range<u32>, usize)>,
     count: usize,
-    /// So many rays must have met them before it is worth finding out where gaps are.
+    maps: Late<Maps>,
+    /// In the order of the runs. It is worth finding all of them once as many rays have met any.
+    faces: Late<Vec<Face>>,
+}
+
+/// What is found once it was asked for often enough; until then, and while somebody is at it, the others do without.
+#[derive(Debug)]
+struct Late<T> {
     enough: usize,
     asked: AtomicUsize,
     taken: AtomicBool,
-    found: OnceLock<Found>,
+    found: OnceLock<T>,
+}
+
+impl<T> Late<T> {
+    fn after(enough: usize) -> Self {
+        Self { enough, asked: AtomicUsize::new(0), taken: AtomicBool::new(false), found: OnceLock::new() }
+    }
+
+    /// Nobody finds it.
+    fn never() -> Self {
+        Self { taken: AtomicBool::new(true), ..Self::after(usize::MAX) }
+    }
+
+    /// What so many rays more ask for.
+    fn get(&self, rays: usize, find: impl FnOnce() -> T) -> Option<&T> {
+        if let Some(found) = self.found.get() {
+            return Some(found);
+        }
+        if self.taken.load(Ordering::Relaxed)
+            || self.asked.fetch_add(rays, Ordering::Relaxed) < self.enough
+            || self.taken.swap(true, Ordering::Relaxed)
+        {
+            return None;
+        }
+        Some(self.found.get_or_init(find))
+    }
 }
 
 /// The map that decides where a material is.
@@ -78,14 +108,12 @@ struct Sheet<'a> {
     texels: Vec2,
 }
 
-#[derive(Debug, Default)]
-struct Found {
-    /// What is known of each map.
-    maps: Vec<Arc<Option<Survey>>>,
-    /// The number of the map of each mesh among them, if it has one.
+/// What is known of maps.
+#[derive(Debug)]
+struct Maps {
+    surveys: Vec<Arc<Option<Survey>>>,
+    /// The number of that of each mesh among them, if it has one.
     of_meshes: Vec<Option<u32>>,
-    /// In the order of the runs.
-    faces: Vec<Face>,
 }
 
 impl<'a> Clearings<'a> {
@@ -113,14 +141,9 @@ impl<'a> Clearings<'a> {
             }
             count += more;
         }
-        if count > MOST {
-            (runs, count) = (Vec::new(), 0);
-        }
-        let mut maps: Vec<u32> = sheets.iter().flatten().map(|sheet| sheet.cut.map.texture).collect();
-        maps.sort_unstable();
-        maps.dedup();
-        let texels = maps.into_iter().map(|map| textures.size(map)).map(|size| (size.x * size.y) as usize);
-        let enough = ENOUGH + count / FACES + texels.sum::<usize>() / TEXELS;
+        let distinct: HashSet<_> = sheets.iter().flatten().map(|sheet| sheet.cut.what()).collect();
+        let texels = distinct.into_iter().map(|(map, ..)| textures.size(map)).map(|size| (size.x * size.y) as usize);
+        let enough = ENOUGH + texels.sum::<usize>() / TEXELS;
         Some(Self {
             scene,
             world,
@@ -128,10 +151,8 @@ impl<'a> Clearings<'a> {
             sheets,
             runs,
             count,
-            enough,
-            asked: AtomicUsize::new(0),
-            taken: AtomicBool::new(false),
-            found: OnceLock::new(),
+            maps: Late::after(enough),
+            faces: if count > MOST { Late::never() } else { Late::after(count) },
         })
     }
 
@@ -158,62 +179,47 @@ impl<'a> Clearings<'a> {
     /// What is known of a prim that so many rays meet, and its map.
     #[inline]
     fn face(&self, prim: u32, rays: usize) -> Option<(Face, &Survey)> {
-        let found = self.find(rays)?;
+        let maps = self.maps.get(rays, || self.survey())?;
         let run = self.runs.get(self.runs.partition_point(|(run, _)| run.end <= prim));
-        let stored = run.filter(|(run, _)| run.start <= prim);
-        let face = match stored {
-            Some((run, before)) => *found.faces.get(before + (prim - run.start) as usize)?,
-            None => self.elsewhere(found, prim)?,
+        let face = match run.filter(|(run, _)| run.start <= prim) {
+            Some((run, before)) => match self.faces.get(rays, || self.all_faces(maps)) {
+                Some(faces) => *faces.get(before + (prim - run.start) as usize)?,
+                None => self.make(maps, prim)?,
+            },
+            None if self.world.kept.is_empty() => return None,
+            None => self.make(maps, prim)?,
         };
-        let map = (**found.maps.get((face.map as usize).checked_sub(1)?)?).as_ref()?;
-        Some((face, map))
+        let survey = (**maps.surveys.get((face.map as usize).checked_sub(1)?)?).as_ref()?;
+        Some((face, survey))
     }
 
-    /// That of a prim that is not among the runs.
+    /// The face of a prim, if it is one of a sheet.
     #[inline(never)]
-    fn elsewhere(&self, found: &Found, prim: u32) -> Option<Face> {
+    fn make(&self, maps: &Maps, prim: u32) -> Option<Face> {
         let PrimSource::Triangle { instance, triangle } = self.world.source(prim) else { return None };
         let mesh = self.scene.instances[instance as usize].mesh as usize;
-        let (sheet, map) = (self.sheets[mesh].as_ref()?, found.of_meshes[mesh]?);
+        let (sheet, map) = (self.sheets[mesh].as_ref()?, maps.of_meshes[mesh]?);
+        Option::as_ref(&maps.surveys[map as usize])?;
         sheet.face(self.world, (instance, triangle, prim), map)
     }
 
-    /// Where gaps are, once it was asked of enough rays, of which these are some.
-    fn find(&self, rays: usize) -> Option<&Found> {
-        if let Some(found) = self.found.get() {
-            return Some(found);
-        }
-        if self.taken.load(Ordering::Relaxed)
-            || self.asked.fetch_add(rays, Ordering::Relaxed) < self.enough
-            || self.taken.swap(true, Ordering::Relaxed)
-        {
-            return None;
-        }
-        Some(self.found.get_or_init(|| self.survey()))
+    fn all_faces(&self, maps: &Maps) -> Vec<Face> {
+        let mut faces = Vec::with_capacity(self.count);
+        let prims = self.runs.iter().flat_map(|(run, _)| run.clone());
+        faces.extend(prims.map(|prim| self.make(maps, prim).unwrap_or(Face::zeroed())));
+        faces
     }
 
-    fn survey(&self) -> Found {
-        let Self { scene, world, textures, .. } = self;
-        let (mut known, mut maps) = (Vec::new(), Vec::new());
-        let mut map_of = |cut: &Cut| {
-            let what = (cut.map.texture, cut.channel, cut.codes);
-            known.iter().position(|known| *known == what).unwrap_or_else(|| {
-                known.push(what);
-                maps.push(textures.survey(cut.map.texture, cut.channel, cut.codes));
-                maps.len() - 1
+    fn survey(&self) -> Maps {
+        let (mut known, mut surveys) = (HashMap::new(), Vec::new());
+        let mut number = |cut: &Cut| {
+            *known.entry(cut.what()).or_insert_with_key(|&(texture, channel, codes)| {
+                surveys.push(self.textures.survey(texture, channel, codes));
+                surveys.len() as u32 - 1
             })
         };
-        let of_meshes: Vec<_> = self.sheets.iter().map(|sheet| Some(map_of(&sheet.as_ref()?.cut) as u32)).collect();
-        let mut faces = Vec::with_capacity(self.count);
-        let all = (0..).zip(&scene.instances).map(|(i, instance)| (i, instance, world.triangles_of(i)));
-        for (i, Instance { mesh, .. }, prims) in all {
-            let is_in_runs = !self.runs.is_empty() && !prims.is_empty() && world.is_stored(prims.start);
-            let sheet = self.sheets[*mesh as usize].as_ref().zip(of_meshes[*mesh as usize]).filter(|_| is_in_runs);
-            let Some((sheet, map)) = sheet else { continue };
-            let face = |(triangle, prim)| sheet.face(world, (i, triangle, prim), map).unwrap_or(Face::zeroed());
-            faces.extend((0..).zip(prims).map(face));
-        }
-        Found { maps, of_meshes, faces }
+        let of_meshes = self.sheets.iter().map(|sheet| Some(number(&sheet.as_ref()?.cut))).collect();
+        Maps { surveys, of_meshes }
     }
 }
 
@@ -255,6 +261,11 @@ impl<'a> Cut<'a> {
 
     /// More than any code.
     const NEVER: u16 = 256;
+
+    /// What must be known of which map.
+    fn what(&self) -> (u32, usize, Codes) {
+        (self.map.texture, self.channel, self.codes)
+    }
 
     /// A mesh that it cuts out, if that has the map, and nothing makes it more opaque than that says.
     fn on(self, mesh: &'a Mesh, textures: &TextureStore) -> Option<Sheet<'a>> {

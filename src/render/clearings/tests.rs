@@ -137,7 +137,7 @@ fn what_is_said_to_be_a_gap_is_shaded_as_nothing_and_what_is_said_to_stop_light_
         let world = World::new(&scene);
         let textures = TextureStore::new(&scene);
         let clearings = Clearings::of(&scene, &world, &textures).unwrap();
-        clearings.found.get_or_init(|| clearings.survey());
+        clearings.maps.found.get_or_init(|| clearings.survey());
         let accel = AnyAccel::build(AccelKind::None, &world.shapes, &AccelParams::DEFAULT);
         for prim in (0..world.triangles()).flat_map(|prim| std::iter::repeat_n(prim, 400)) {
             let (ray, cone) = toward(&mut random, world.triangle(prim), prim);
@@ -186,7 +186,7 @@ fn rays_that_are_asked_together_are_told_what_each_is_told_alone() {
     let world = World::new(&scene);
     let textures = TextureStore::new(&scene);
     let clearings = Clearings::of(&scene, &world, &textures).unwrap();
-    clearings.found.get_or_init(|| clearings.survey());
+    clearings.maps.found.get_or_init(|| clearings.survey());
     let mut passed = 0;
     for prim in (0..world.triangles()).flat_map(|prim| std::iter::repeat_n(prim, 30)) {
         let rays: Vec<(Ray, [f32; 2])> = (0..40).map(|_| toward(&mut random, world.triangle(prim), prim)).collect();

@@ -23,7 +23,7 @@ const LEVELS: usize = 16;
 const ROUNDING: f32 = 1.02;
 
 /// What a channel of a map says, of 8 bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Codes {
     /// A place is clear with no more than this: it is as good as nothing there.
     pub most: u8,
