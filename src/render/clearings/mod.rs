@@ -25,9 +25,11 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// Rays that meet faces before it is worth finding out where maps are clear: some, and one for so many texels.
+/// Rays that meet faces before it is worth finding out where maps are clear: some, and one for so many texels, and for so many
+/// faces, of which a large part will not be met twice.
 const ENOUGH: usize = 1 << 12;
 const TEXELS: usize = 1 << 8;
+const FACES: usize = 1 << 3;
 
 /// More faces than these are not kept: each is found anew when it is met.
 const MOST: usize = 1 << 20;
@@ -143,7 +145,7 @@ impl<'a> Clearings<'a> {
         }
         let distinct: HashSet<_> = sheets.iter().flatten().map(|sheet| sheet.cut.what()).collect();
         let texels = distinct.into_iter().map(|(map, ..)| textures.size(map)).map(|size| (size.x * size.y) as usize);
-        let enough = ENOUGH + texels.sum::<usize>() / TEXELS;
+        let enough = ENOUGH + count / FACES + texels.sum::<usize>() / TEXELS;
         Some(Self {
             scene,
             world,
