@@ -91,7 +91,7 @@ impl Face {
 
     /// The same with what cuts it out.
     pub(super) fn cut_by(self, map: u32, [one_sided, sharp]: [bool; 2]) -> Self {
-        Self { map, flags: u32::from(one_sided) * ONE_SIDED | u32::from(sharp) * SHARP, ..self }
+        Self { map, flags: (u32::from(one_sided) * ONE_SIDED) | (u32::from(sharp) * SHARP), ..self }
     }
 
     /// What is known of where some rays meet the plane; of maps as sharp as they are where cones have no width, or
