@@ -287,7 +287,7 @@ fn most(material: &Material) -> Option<u8> {
         AlphaMode::Opaque => None,
         AlphaMode::Blend => Some(0),
         AlphaMode::Mask { cutoff } => {
-            /// Means in smaller copies are rounded, at most by this.
+            /// Far more than the mean of four texels is rounded.
             const ROUNDED: f32 = 1e-3;
             let is_hole = |code: &u8| material.opacity * (f32::from(*code) / 255.0 + ROUNDED) < cutoff;
             (0..=u8::MAX).take_while(is_hole).last()
