@@ -4,10 +4,14 @@
 //! Many programs write that a material is blended or cut out where little of it is: one leaf on an atlas, or nothing at all.
 //! What is known to stop light need not be asked at every point.
 
+mod blocks;
+
 use crate::accel::BitSet;
-use crate::math::{Vec2, Vec4};
+use crate::math::Vec4;
 use crate::render::patch::coordinates_at;
-use crate::scene::{AlphaMode, Bitmap, Material, Mesh, Pixels, Scene, TextureRef, Wrap};
+use crate::scene::{AlphaMode, Material, Mesh, Scene, TextureRef, Wrap};
+pub(in crate::render) use blocks::code;
+use blocks::{Blocks, Extremes, FARTHEST};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -25,7 +29,7 @@ pub(super) enum Solid {
 
 /// Which faces of each mesh of a scene stop light; of textures that are not there nothing is known.
 pub(super) fn solids(scene: &Scene) -> Vec<Solid> {
-    let mut known = Known { scene, blocks: HashMap::new() };
+    let mut known = Known { scene, extremes: HashMap::new(), blocks: HashMap::new() };
     let mut layers: Vec<Option<Option<Vec<Layer>>>> = scene.materials.iter().map(|_| None).collect();
     let of = |mesh: &Mesh| {
         let number = mesh.material as usize;
@@ -49,6 +53,8 @@ struct Layer {
 /// What is known of bitmaps: materials often share them.
 struct Known<'a> {
     scene: &'a Scene,
+    /// By number and channel.
+    extremes: HashMap<(u32, usize), Option<Extremes>>,
     /// By number, channel, and the bits of what may be stored.
     blocks: HashMap<(u32, usize, [u32; 2]), Option<Arc<Blocks>>>,
 }
@@ -74,8 +80,9 @@ impl Known<'_> {
     fn layer(&mut self, map: &TextureRef, channel: usize, range: [f32; 2]) -> Option<Layer> {
         let texture = self.scene.textures.get(map.texture as usize)?;
         let bitmap = self.scene.bitmaps.get(texture.bitmap as usize)?;
+        let extremes = self.extremes.entry((texture.bitmap, channel)).or_insert_with(|| Extremes::of(bitmap, channel));
         let blocks = self.blocks.entry((texture.bitmap, channel, range.map(f32::to_bits)));
-        let blocks = blocks.or_insert_with(|| Blocks::of(bitmap, channel, range).map(Arc::new));
+        let blocks = blocks.or_insert_with(|| Some(Arc::new(extremes.as_ref()?.blocks(range))));
         Some(Layer {
             map: *map,
             wrap: [texture.sampler.wrap_u, texture.sampler.wrap_v],
@@ -143,133 +150,14 @@ impl Layer {
     }
 }
 
-/// Columns and rows of texels in a block.
-const BLOCK: usize = 8;
-
-/// Which blocks of texels of a bitmap are solid.
-struct Blocks {
-    /// Columns and rows of the bitmap.
-    size: [usize; 2],
-    /// How many are not, above and to the left of each corner of a block, row by row; empty where all are.
-    sums: Vec<u32>,
-}
-
-impl Blocks {
-    /// Those whose numbers of a channel are the least, or more, and the most, or less, 0 … 1. `None` for a bitmap that
-    /// is not there.
-    fn of(bitmap: &Bitmap, channel: usize, range: [f32; 2]) -> Option<Self> {
-        let size = [bitmap.width as usize, bitmap.height as usize];
-        let texels = size[0].checked_mul(size[1]).filter(|&texels| texels > 0)?;
-        let open = match &bitmap.pixels {
-            Pixels::Rgb8(numbers) if numbers.len() != 3 * texels => return None,
-            Pixels::Rgb8(_) if channel == ALPHA => Vec::new(),
-            Pixels::Rgb8(numbers) => open(size, numbers.as_chunks::<3>().0, channel, range.map(|x| code(x, 255))),
-            Pixels::Rgba8(all) => open(size, all.get(..texels)?, channel, range.map(|x| code(x, 255))),
-            Pixels::Rgba16(all) => open(size, all.get(..texels)?, channel, range.map(|x| code(x, 65535))),
-        };
-        Some(Self { size, sums: if open.contains(&1) { summed(size, &open) } else { Vec::new() } })
-    }
-
-    /// Whether all are solid.
-    fn are_solid(&self) -> bool {
-        self.sums.is_empty()
-    }
-
-    /// Whether all are from which anything is read between these coordinates.
-    fn are_solid_between(&self, lo: Vec2, hi: Vec2, wrap: [Wrap; 2]) -> bool {
-        let columns = spans([lo.x, hi.x], self.size[0], wrap[0]);
-        let rows = spans([lo.y, hi.y], self.size[1], wrap[1]);
-        let pitch = self.size[0].div_ceil(BLOCK) + 1;
-        let sum = |x: usize, y: usize| self.sums[y * pitch + x];
-        rows.into_iter().flatten().all(|[top, bottom]| {
-            columns.into_iter().flatten().all(|[left, right]| {
-                let ([left, top], [right, bottom]) =
-                    ([left / BLOCK, top / BLOCK], [right / BLOCK + 1, bottom / BLOCK + 1]);
-                sum(right, bottom) + sum(left, top) == sum(right, top) + sum(left, bottom)
-            })
-        })
-    }
-}
-
-/// The least stored number that is no less than such a part of the largest.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 … 65535")]
-pub(in crate::render) fn code(part: f32, largest: u16) -> u16 {
-    libm::ceil(f64::from(part) * f64::from(largest)) as u16
-}
-
-/// Of each block of texels, row by row, 1 where one has less or more in a channel.
-fn open<T: Copy + Into<u16> + Sync, const N: usize>(
-    [width, height]: [usize; 2],
-    texels: &[[T; N]],
-    channel: usize,
-    [least, most]: [u16; 2],
-) -> Vec<u8> {
-    let columns = width.div_ceil(BLOCK);
-    let mut open = vec![0_u8; columns * height.div_ceil(BLOCK)];
-    let rows = texels.par_chunks(width * BLOCK).zip(open.par_chunks_mut(columns));
-    rows.with_min_len(BLOCK).for_each(|(texels, open)| {
-        for row in texels.chunks(width) {
-            for (open, texels) in open.iter_mut().zip(row.chunks(BLOCK)) {
-                let number = |texel: &[T; N]| texel[channel].into();
-                let is_open = |texel| (number(texel) < least) | (number(texel) > most);
-                *open |= texels.iter().fold(0, |open, texel| open | u8::from(is_open(texel)));
-            }
-        }
-    });
-    open
-}
-
-/// The sums over all blocks above and to the left of each corner.
-fn summed([width, height]: [usize; 2], open: &[u8]) -> Vec<u32> {
-    let (columns, rows) = (width.div_ceil(BLOCK), height.div_ceil(BLOCK));
-    let pitch = columns + 1;
-    let mut sums = vec![0; pitch * (rows + 1)];
-    for (y, row) in open.chunks(columns).enumerate() {
-        let mut so_far = 0;
-        for (x, open) in row.iter().enumerate() {
-            so_far += u32::from(*open);
-            sums[(y + 1) * pitch + x + 1] = sums[y * pitch + x + 1] + so_far;
-        }
-    }
-    sums
-}
-
-/// Coordinates beyond this are rounded by more than a texel of large maps.
-const FARTHEST: f32 = 64.0;
-
-/// The first and last texels along an axis of all that is read between two coordinates: one run of them or two.
-#[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "places of some texels")]
-fn spans([lo, hi]: [f32; 2], len: usize, wrap: Wrap) -> [Option<[usize; 2]>; 2] {
-    let all = [Some([0, len - 1]), None];
-    if !(lo >= -FARTHEST && hi <= FARTHEST) {
-        return all;
-    }
-    // Two texels are mixed; one more on each side is for rounding.
-    let place = |c: f32| libm::floor(f64::from(c) * len as f64 - 0.5) as i64;
-    let (first, last, count) = (place(lo) - 1, place(hi) + 2, len as i64);
-    let index = |i: i64| usize::try_from(i).unwrap_or(0).min(len - 1);
-    if last - first >= count - 1 {
-        return all;
-    }
-    match wrap {
-        Wrap::Clamp => [Some([index(first), index(last)]), None],
-        Wrap::Mirror if first < 0 || last >= count => all,
-        Wrap::Mirror => [Some([index(first), index(last)]), None],
-        Wrap::Repeat => {
-            let [first, last] = [first, last].map(|i| index(i.rem_euclid(count)));
-            if first <= last { [Some([first, last]), None] } else { [Some([0, last]), Some([first, len - 1])] }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Vec3;
     use crate::math::random::Random;
+    use crate::math::{Vec2, Vec3};
     use crate::render::context::coverage;
     use crate::render::texture::TextureStore;
-    use crate::scene::{Filter, MetalRough, Phong, Reflection, Sampler, Texture, UvTransform};
+    use crate::scene::{Bitmap, Filter, MetalRough, Phong, Pixels, Reflection, Sampler, Texture, UvTransform};
 
     /// Mostly solid, with some holes: all of one or of several texels.
     fn holed(random: &mut Random, [width, height]: [usize; 2]) -> Bitmap {
@@ -429,22 +317,5 @@ mod tests {
         assert_eq!(least(&with(0.5, 0.5)), Some(1.0));
         assert_eq!(least(&with(0.4, 0.5)), None);
         assert!(least(&with(0.8, 0.4)).is_some_and(|least| least > 0.5 && least < 0.501));
-        assert_eq!([code(0.5, 255), code(1.0, 255), code(0.0, 255), code(1.0, 65535)], [128, 255, 0, 65535]);
-    }
-
-    #[test]
-    fn runs_of_texels_go_over_the_edge_where_a_map_repeats() {
-        let at = |lo: f32, hi: f32, wrap| {
-            spans([lo / 100.0, hi / 100.0], 100, wrap).into_iter().flatten().collect::<Vec<_>>()
-        };
-        assert_eq!(at(20.0, 30.0, Wrap::Repeat), [[18, 31]]);
-        assert_eq!(at(-5.0, 5.0, Wrap::Repeat), [[0, 6], [93, 99]]);
-        assert_eq!(at(995.0, 1005.0, Wrap::Repeat), [[0, 6], [93, 99]]);
-        assert_eq!(at(1.0, 99.0, Wrap::Repeat), [[0, 99]]);
-        assert_eq!(at(-50.0, -5.0, Wrap::Clamp), [[0, 0]]);
-        assert_eq!(at(50.0, 120.0, Wrap::Clamp), [[48, 99]]);
-        assert_eq!(at(-5.0, 5.0, Wrap::Mirror), [[0, 99]]);
-        assert_eq!(at(9990.0, 9991.0, Wrap::Repeat), [[0, 99]], "far away");
-        assert_eq!(at(f32::NAN, 1.0, Wrap::Repeat), [[0, 99]]);
     }
 }
