@@ -2,7 +2,7 @@
 
 use super::crowd::Crowd;
 use super::parts::{Grain, Part, faces, gather, hull, solids};
-use super::slices::Slices;
+use super::slices::{Covered, Slices};
 use crate::math::DVec3;
 use crate::scene::corners::{Hull, Outline, object_boxes, placed_box, take_in};
 use crate::scene::{Instance, Mesh, Scene};
@@ -179,23 +179,37 @@ fn is_whole(scene: &Scene, bounds: &Bounds) -> Option<bool> {
             return Some(true);
         }
     }
-    let covered = sample.reached.covered();
-    let (mut all, mut cells) = (Slices::new(bounds), Vec::new());
+    let mut all = Slices::new(bounds);
+    cover_all(scene, &mut all, sample.reached.covered())?;
+    // Polygons are none of the triangles.
+    let counted = scene.meshes.iter().all(|mesh| mesh.polygons.is_empty());
+    Some(all.has_no_gap() || counted && all.holds_together())
+}
+
+/// Notes how far the triangles of all instances reach, or of some that leave no gap; `covered` are slices that some are known
+/// to reach into. How many instances were looked at face by face: what stands in a row with one of these is known by its box.
+/// `None` where a corner is nowhere.
+fn cover_all(scene: &Scene, all: &mut Slices, mut covered: Covered) -> Option<usize> {
+    let (mut looked_at, mut cells) = (0, Vec::new());
     let is_crowd = scene.instances.len() > scene.meshes.len();
     let boxes = if is_crowd { object_boxes(scene) } else { vec![None; scene.meshes.len()] };
     for (instance, mesh) in placed(scene) {
         let place = boxes[instance.mesh as usize].filter(|_| has_many(mesh)).map(|b| placed_box(b, instance));
         match place.filter(|place| all.lies_throughout(&covered, place)) {
             Some(place) => all.cover_between(&place, mesh.triangles.len() as u64),
-            None => all.cover(instance, mesh, &mut cells)?,
+            None => {
+                all.cover(instance, mesh, &mut cells)?;
+                looked_at += 1;
+                if has_many(mesh) {
+                    all.reached.add_covered(&mut covered);
+                }
+            }
         }
         if has_many(mesh) && all.has_no_gap() {
-            return Some(true);
+            break;
         }
     }
-    // Polygons are none of the triangles.
-    let counted = scene.meshes.iter().all(|mesh| mesh.polygons.is_empty());
-    Some(all.has_no_gap() || counted && all.holds_together())
+    Some(looked_at)
 }
 
 /// Whether a mesh has more faces than are worth a question.
@@ -323,6 +337,27 @@ mod tests {
             assert_eq!(found, slow, "{far}");
             assert!(!Crowd::of(&scene).is_empty() && (found.strays > 0) == (far > 0.0), "{far}");
         }
+    }
+
+    #[test]
+    fn what_stands_in_rows_with_gaps_between_is_asked_face_by_face_for_one_of_each_row() {
+        let mut scene = spiral(40_000, 0.0);
+        let place = |i: u32| {
+            let place = DVec3::new(f64::from(i % 20) * 4.0, f64::from(i / 20) * 3.0, 0.0);
+            Instance { name: String::new(), mesh: 0, world_from_object: DAffine3::from_translation(place) }
+        };
+        scene.instances = (0..400).map(place).collect();
+        let whole = hull(&scene, Grain::Faces, |_| true).expect("there are faces");
+        let bounds = Bounds { lo: whole.0, hi: whole.1, strays: 0, whole };
+        let mut slices = Slices::new(&bounds);
+        let nothing = slices.reached.covered();
+        let looked_at = cover_all(&scene, &mut slices, nothing).expect("all are somewhere");
+        assert!(!slices.has_no_gap() && (20..60).contains(&looked_at), "{looked_at} of 400");
+        let mut slow = Slices::new(&bounds);
+        let mut cells = Vec::new();
+        scene.instances.iter().for_each(|i| slow.cover(i, &scene.meshes[0], &mut cells).expect("all are somewhere"));
+        assert_eq!(slices.reached.covered(), slow.reached.covered());
+        assert_eq!(slices.holds_together(), slow.holds_together());
     }
 
     /// Clusters of faces side by side, of any size and at any distance. Every eighth seed has meshes of many faces, each in

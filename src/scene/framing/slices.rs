@@ -292,6 +292,12 @@ impl Reached {
         })
     }
 
+    /// Adds the slices that some part reaches into to others.
+    pub(super) fn add_covered(&self, covered: &mut Covered) {
+        let pairs = covered.as_flattened_mut().iter_mut().zip(self.covered().into_iter().flatten());
+        pairs.for_each(|(covered, more)| *covered |= more);
+    }
+
     /// The part of all that lies before the first empty slice of an axis, from the end where that is less; 1 where no slice
     /// is empty.
     fn least_before_a_gap(&self, axis: usize) -> f64 {
