@@ -242,7 +242,10 @@ fn one(t: Option<f32>) -> [f32; 2] {
     [t.unwrap_or(f32::NAN), f32::NAN]
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 - 1 prims or vertices")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "`Scene::check` and loading refuse more prims; vertices are no more than their corners"
+)]
 fn index(i: usize) -> u32 {
     i as u32
 }

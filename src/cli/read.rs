@@ -4,7 +4,7 @@ use super::args::{LoadArgs, ModelArgs};
 use super::exit::Exit;
 use super::message::{Messages, Severity};
 use super::moment;
-use crate::load::{Diagnostic, Limits, LoadError, LoadOptions, Loaded, check_moment, load, load_bytes};
+use crate::load::{Diagnostic, Limits, LoadError, LoadOptions, Loaded, check_moment, check_prims, load, load_bytes};
 use crate::math::DAffine3;
 use crate::render::{Instancing, Placing, World};
 use std::io::Read;
@@ -28,6 +28,7 @@ pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded,
         append(&mut whole, part);
     }
     whole.facts.hash = xxh3_128(&hashes);
+    check_prims(&whole.scene, first)?;
     check_moment(&mut whole, first, options)?;
     Ok(whole)
 }

@@ -268,7 +268,22 @@ fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadErr
     let mut budget = Budget::new(&options.limits);
     let mut loaded = load_within(source, options, &mut budget)?;
     loaded.facts.charged = options.limits.memory - budget.left();
+    check_prims(&loaded.scene, &source.path)?;
     Ok(loaded)
+}
+
+/// Refuses a scene that shows more prims than there are numbers for: a small file can show a large mesh in many places.
+pub(crate) fn check_prims(scene: &Scene, file: &Path) -> Result<(), LoadError> {
+    let (shown, most) = (scene.prims(), Scene::MOST_PRIMS);
+    if shown <= most {
+        return Ok(());
+    }
+    let instances = scene.instances.len();
+    let text =
+        format!("its {instances} instances show {shown} triangles and other prims where {most} can be told apart");
+    Err(Diagnostic::new("too-many-prims", file, "", text)
+        .remedy("show fewer of them, or meshes with fewer faces")
+        .into())
 }
 
 /// Loads what is in memory already; whatever that takes comes out of one budget.

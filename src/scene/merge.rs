@@ -125,7 +125,7 @@ impl UpAxis {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 parts")]
+#[expect(clippy::cast_possible_truncation, reason = "memory for 2^32 parts of a kind is not granted")]
 fn count(n: usize) -> u32 {
     n as u32
 }

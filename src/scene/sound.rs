@@ -1,6 +1,6 @@
 //! Whether a scene that was made by hand can be placed and rendered.
 
-use super::{Mesh, Pixels, Scene};
+use super::{Instance, Mesh, Pixels, Scene};
 use crate::math::DVec3;
 
 /// What is wrong with a scene, and where.
@@ -72,7 +72,20 @@ impl Scene {
         if let Some(panorama) = &self.panorama {
             covers(|| "panorama.texels".into(), panorama.texels.len(), (panorama.width, panorama.height))?;
         }
-        self.hints.camera.map_or(Ok(()), |i| points(|| "hints.camera".into(), i, self.cameras.len(), "cameras"))
+        self.hints.camera.map_or(Ok(()), |i| points(|| "hints.camera".into(), i, self.cameras.len(), "cameras"))?;
+        let text = || format!("{} prims are shown, of which {} can be told apart", self.prims(), Self::MOST_PRIMS);
+        holds(self.prims() <= Self::MOST_PRIMS, || "instances".into(), text)
+    }
+
+    /// The most prims that can be told apart: the last number of 32 bits means none.
+    pub const MOST_PRIMS: u64 = u32::MAX as u64 - 1;
+
+    /// Prims that are shown: triangles and polygons, those of a mesh once for each instance of it, spheres, cones and planes.
+    pub fn prims(&self) -> u64 {
+        let faces = |mesh: &Mesh| (mesh.triangles.len() + mesh.polygons.len()) as u64;
+        let shown = |instance: &Instance| self.meshes.get(instance.mesh as usize).map_or(0, faces);
+        let others = self.spheres.len() + self.cones.len() + self.planes.len();
+        self.instances.iter().map(shown).fold(others as u64, u64::saturating_add)
     }
 }
 
@@ -181,6 +194,23 @@ mod tests {
             bitmaps: vec![Bitmap { name: String::new(), width: 2, height: 1, pixels }],
             ..Scene::default()
         }
+    }
+
+    #[test]
+    fn more_prims_than_can_be_told_apart_are_a_fault() {
+        let mut scene = sound();
+        scene.meshes[0].triangles = vec![[0, 1, 2]; (1 << 16) - 1];
+        let instance = scene.instances[0].clone();
+        // Each shows the triangles and a polygon; sphere, cone and plane are left for the last numbers but two.
+        scene.instances = vec![instance; (1 << 16) - 1];
+        assert_eq!(scene.prims(), (1 << 32) - (1 << 16) + 3);
+        assert_eq!(scene.check(), Ok(()));
+        let sphere = scene.spheres[0].clone();
+        scene.spheres.resize((1 << 16) - 4, sphere.clone());
+        assert_eq!((scene.prims(), scene.check()), (Scene::MOST_PRIMS, Ok(())));
+        scene.spheres.push(sphere);
+        let fault = scene.check().unwrap_err().to_string();
+        assert_eq!(fault, "instances: 4294967295 prims are shown, of which 4294967294 can be told apart");
     }
 
     #[test]

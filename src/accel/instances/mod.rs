@@ -181,7 +181,7 @@ impl Kept {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 - 1 prims")]
+#[expect(clippy::cast_possible_truncation, reason = "`Scene::check` and loading refuse more than `Scene::MOST_PRIMS`")]
 fn index(i: usize) -> u32 {
     i as u32
 }

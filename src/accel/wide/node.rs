@@ -68,6 +68,8 @@ impl Child {
     pub(super) const ENTRANCE: u32 = Self::LEAF - 1;
     const LEAF: u32 = 1 << 31;
     const COUNT: u32 = 27;
+    /// The most blocks, and the most runs, of a tree: [`Self::END`] would be one more.
+    pub(super) const MOST: usize = (1 << Self::COUNT) - 1;
     /// A count that no block has marks a run.
     const RUN: u32 = 15;
 

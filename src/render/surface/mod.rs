@@ -355,7 +355,10 @@ pub(crate) fn facing(normal: Vec3, view: Vec3) -> Vec3 {
     (normal + view * (GRAZING - normal.dot(view))).try_normalize().unwrap_or(view)
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 - 1 things of a kind")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "`Scene::check` and loading refuse more prims, and with them more of each kind"
+)]
 fn id(i: usize) -> u32 {
     i as u32
 }

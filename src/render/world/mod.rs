@@ -300,9 +300,9 @@ impl World {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 - 1 prims or vertices")]
+/// Numbers of prims are in range ([`Scene::MOST_PRIMS`]); those of vertices, of which there are up to three for each, may not be.
 fn index(i: usize) -> u32 {
-    i as u32
+    u32::try_from(i).unwrap_or_else(|_| panic!("the scene is too large: {i} vertices and more, stored by themselves"))
 }
 
 #[cfg(test)]

@@ -43,6 +43,8 @@ const KNOTS: usize = 1 << 14;
 const ROOM: usize = 32;
 
 /// Builds the tree over all bounded prims, cut as if there were `times` as many.
+///
+/// Panics where there are more blocks than can be numbered: with hundreds of millions of triangles.
 pub(super) fn build(shapes: &Shapes, splitting: Splitting, times: usize) -> Arrays {
     if shapes.bounded() == 0 {
         return Nodes::default().into_arrays(0, Aabb::EMPTY);
@@ -55,6 +57,8 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting, times: usize) -> Arra
         knots = binary_tree(shapes, splitting, times).knots;
     }
     let leaves = Leaves::list(&mut knots, index(triangles));
+    let most = leaves.blocks.len().max(leaves.runs.len());
+    assert!(most <= Child::MOST, "the scene is too large: {most} blocks, where a tree has room for {}", Child::MOST);
     let bounds = knots.first().map_or(Aabb::EMPTY, Knot::bounds);
     let nodes = Nodes::over(&knots);
     drop(knots);

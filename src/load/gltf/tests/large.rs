@@ -101,6 +101,29 @@ fn copies_of_a_large_mesh_are_refused_before_memory_is_taken() {
 }
 
 #[test]
+fn a_mesh_in_more_places_than_its_triangles_have_numbers_for_is_refused() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    let indices = file.shorts(&[0, 1, 2].repeat(MANY));
+    file.primitive(json!({"attributes": {"POSITION": positions}, "indices": indices}));
+    file.set("extensionsUsed", json!(["EXT_mesh_gpu_instancing"]));
+    let mut copies = |count: usize| {
+        let places = file.push("accessors", json!({"componentType": 5126, "type": "VEC3", "count": count}));
+        let copies = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}});
+        file.set("nodes", json!([{"mesh": 0, "extensions": copies}]));
+        load_bytes(Path::new("a.gltf"), file.gltf(), &LoadOptions::default())
+    };
+    let most = u32::MAX as usize / MANY;
+    assert_eq!(copies(most).expect("there are numbers for so many").scene.prims(), (most * MANY) as u64);
+    let Err(LoadError::Input(faults)) = copies(most + 1) else { panic!("there are no numbers for so many") };
+    assert_eq!(
+        faults.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        ["a.gltf: its 42950 instances show 4295000000 triangles and other prims where 4294967294 can be told apart; \
+             show fewer of them, or meshes with fewer faces"]
+    );
+}
+
+#[test]
 fn bounds_of_accessors_that_lie_over_each_other_are_compared_for_some_of_them() {
     let mut file = Builder::new();
     file.floats("VEC3", &[0.0; 9000]);
