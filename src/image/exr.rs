@@ -21,7 +21,7 @@ use crate::quiet::attempt;
 use crate::threads;
 use ::exr::image::{Blocks, Encoding, FlatSamples, Image, Layer};
 use ::exr::meta::MetaData;
-use ::exr::meta::attribute::{AttributeValue, Chromaticities, LineOrder, Text};
+use ::exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text};
 use ::exr::prelude::{
     AnyChannel, AnyChannels, Compression, LayerAttributes, ReadChannels, ReadLayers, SmallVec, Vec2, WritableImage, f16,
 };
@@ -181,12 +181,17 @@ pub(super) fn read_metadata(file: impl BufRead) -> Result<Metadata, ImageError> 
 ///
 /// Colours of other primaries become those of Rec. 709. A picture of luminance alone (`Y`) is grey. Its chroma, which
 /// has fewer values than there are pixels, is left out.
+///
+/// What is stored of it lies where the file says within the display window; the rest of that is clear, and nothing was hit
+/// there.
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<(Picture, Vec<String>), ImageError> {
     let fail = |e: ::exr::error::Error| ImageError::decode(FileKind::Exr, e);
     let meta = MetaData::read_from_buffered(bytes, false).map_err(fail)?;
     for header in &meta.headers {
         let side = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
         let Vec2(width, height) = header.layer_size;
+        super::read::check_size(FileKind::Exr, side(width), side(height), max_pixels)?;
+        let Vec2(width, height) = header.shared_attributes.display_window.size;
         super::read::check_size(FileKind::Exr, side(width), side(height), max_pixels)?;
         if header.deep {
             return Err(ImageError::decode(FileKind::Exr, "deep pixels are not supported"));
@@ -203,11 +208,13 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<(Picture, Vec<Stri
         .ok_or_else(|| ImageError::decode(FileKind::Exr, "it is damaged"))?
         .map_err(fail)?;
     let layer = &image.layer_data;
-    let Vec2(width, height) = layer.size;
-    let channels = Channels { list: &layer.channel_data.list, len: width * height };
+    let window = Window::of(layer.size, layer.attributes.layer_position, image.attributes.display_window);
+    let channels = Channels { list: &layer.channel_data.list, len: layer.size.area(), window };
+    let Vec2(width, height) = channels.window.size;
     let as_u32 = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     let (mut beauty, layers) = (channels.beauty()?, channels.layers());
     let mut left_out = channels.too_short();
+    left_out.extend(channels.window.is_cropped().then(|| "pixels outside of the display window".to_owned()));
     match other_primaries(&meta).map(|primaries| primaries.to_rec_709()) {
         Some(Some(turned)) => beauty.iter_mut().for_each(|pixel| turn(turned, pixel)),
         Some(None) => left_out.push("chromaticities, which are those of no colours".into()),
@@ -236,11 +243,54 @@ fn turn(turned: DMat3, pixel: &mut [f32; 4]) {
     [pixel[0], pixel[1], pixel[2]] = color.to_array().map(|c| c as f32);
 }
 
+/// Which of the pixels that are stored a picture shows, and where.
+struct Window {
+    /// Columns and rows of the picture.
+    size: Vec2<usize>,
+    /// Columns and rows that are stored.
+    stored: Vec2<usize>,
+    /// The first of them, from the first of the picture.
+    first: Vec2<i64>,
+}
+
+impl Window {
+    fn of(stored: Vec2<usize>, at: Vec2<i32>, display: IntegerBounds) -> Self {
+        let apart = |at: i32, display: i32| i64::from(at) - i64::from(display);
+        let first = Vec2(apart(at.0, display.position.0), apart(at.1, display.position.1));
+        Self { size: display.size, stored, first }
+    }
+
+    /// Whether any that is stored is not shown.
+    fn is_cropped(&self) -> bool {
+        let is_within = |first: i64, stored: usize, size: usize| first >= 0 && stored as i64 <= size as i64 - first;
+        let Self { size, stored, first } = self;
+        !(is_within(first.0, stored.0, size.0) && is_within(first.1, stored.1, size.1))
+    }
+
+    /// What the picture has of such values, and `outside` where none is stored.
+    fn shown<T: Copy>(&self, values: Vec<T>, outside: T) -> Vec<T> {
+        if (self.size, self.first) == (self.stored, Vec2(0, 0)) {
+            return values;
+        }
+        let mut shown = vec![outside; self.size.area()];
+        let place = |i: i64, first: i64, stored: usize| usize::try_from(i - first).ok().filter(|&i| i < stored);
+        for (y, row) in (0..).zip(shown.chunks_mut(self.size.0.max(1))) {
+            let Some(stored) = place(y, self.first.1, self.stored.1) else { continue };
+            let stored = &values[stored * self.stored.0..][..self.stored.0];
+            for (x, to) in (0..).zip(row) {
+                *to = place(x, self.first.0, self.stored.0).map_or(outside, |x| stored[x]);
+            }
+        }
+        shown
+    }
+}
+
 /// The channels of a part, found by name.
 struct Channels<'a> {
     list: &'a [AnyChannel<FlatSamples>],
-    /// Pixels.
+    /// Pixels that are stored.
     len: usize,
+    window: Window,
 }
 
 impl Channels<'_> {
@@ -250,13 +300,19 @@ impl Channels<'_> {
         self.list.iter().find(named).map(|c| &c.sample_data).filter(|s| s.len() == self.len)
     }
 
+    /// The values that are shown, 0 where none are stored.
     fn floats(&self, name: &str) -> Option<Vec<f32>> {
-        self.find(name).map(|samples| samples.values_as_f32().collect())
+        self.floats_or(name, 0.0)
+    }
+
+    /// The same, `outside` where none are stored.
+    fn floats_or(&self, name: &str, outside: f32) -> Option<Vec<f32>> {
+        self.find(name).map(|samples| self.window.shown(samples.values_as_f32().collect(), outside))
     }
 
     fn ids(&self, name: &str) -> Vec<u32> {
         match self.find(name) {
-            Some(FlatSamples::U32(ids)) => ids.clone(),
+            Some(FlatSamples::U32(ids)) => self.window.shown(ids.clone(), u32::MAX),
             _ => Vec::new(),
         }
     }
@@ -274,14 +330,15 @@ impl Channels<'_> {
             let reason = format!("it has no colours (R, G, B or Y); its channels are {}", names.join(", "));
             return Err(ImageError::decode(FileKind::Exr, reason));
         };
-        let or = |name: &str, default: f32| self.floats(name).unwrap_or_else(|| vec![default; self.len]);
+        let all = |value: f32| self.window.shown(vec![value; self.len], 0.0);
+        let or = |name: &str, default: f32| self.floats(name).unwrap_or_else(|| all(default));
         let ([r, g, b], a) = (colors.map(|name| or(name, 0.0)), or("A", 1.0));
-        Ok((0..self.len).map(|i| [r[i], g[i], b[i], a[i]]).collect())
+        Ok((0..a.len()).map(|i| [r[i], g[i], b[i], a[i]]).collect())
     }
 
     fn triples(&self, names: Triple) -> Vec<[f32; 3]> {
         let [Some(x), Some(y), Some(z)] = names.map(|name| self.floats(name)) else { return Vec::new() };
-        (0..self.len).map(|i| [x[i], y[i], z[i]]).collect()
+        (0..x.len()).map(|i| [x[i], y[i], z[i]]).collect()
     }
 
     /// Names of the channels that are part of the beauty or of an array of [`Layers`].
@@ -302,9 +359,8 @@ impl Channels<'_> {
                 return None;
             }
             let values = match &channel.sample_data {
-                FlatSamples::U32(values) => Values::U32(values.clone()),
-                FlatSamples::F32(values) => Values::F32(values.clone()),
-                FlatSamples::F16(values) => Values::F32(values.iter().map(|half| half.to_f32()).collect()),
+                FlatSamples::U32(values) => Values::U32(self.window.shown(values.clone(), 0)),
+                other => Values::F32(self.window.shown(other.values_as_f32().collect(), 0.0)),
             };
             Some(Channel { name, values })
         };
@@ -322,7 +378,7 @@ impl Channels<'_> {
             albedo: self.triples(ALBEDO),
             normal: self.triples(NORMAL),
             position: self.triples(POSITION),
-            depth: self.floats("Z").unwrap_or_default(),
+            depth: self.floats_or("Z", f32::INFINITY).unwrap_or_default(),
             prim: self.ids("id.prim"),
             instance: self.ids("id.instance"),
             channels: self.others(),
@@ -460,6 +516,44 @@ mod tests {
         let nowhere = Chromaticities { red: REC_709.white, green: REC_709.white, blue: REC_709.white, ..REC_709 };
         let (picture, left_out) = of(Some(nowhere));
         assert_eq!((picture.beauty[0], left_out.len()), (plain, 1));
+    }
+
+    #[test]
+    fn pixels_lie_where_the_windows_say_and_what_is_not_shown_is_named() {
+        let numbers = |n: usize| FlatSamples::F32((1..=n).map(|i| i as f32).collect());
+        let of = |at: (i32, i32), (position, size): ((i32, i32), (usize, usize))| {
+            let ids = FlatSamples::U32(vec![7; 6]);
+            let channels = [("A", numbers(6)), ("R", numbers(6)), ("Z", numbers(6)), ("id.prim", ids)];
+            let channels = channels.map(|(name, samples)| AnyChannel::new(text(name), samples));
+            let mut attributes = LayerAttributes::named(text("part"));
+            attributes.layer_position = Vec2(at.0, at.1);
+            let channels = AnyChannels::sort(channels.into_iter().collect());
+            let layer = Layer::new((3, 2), attributes, Encoding::UNCOMPRESSED, channels);
+            let window = IntegerBounds::new(Vec2(position.0, position.1), Vec2(size.0, size.1));
+            let attributes = ::exr::meta::header::ImageAttributes::new(window);
+            let mut file = Cursor::new(Vec::new());
+            Image::from_layers(attributes, SmallVec::from_elem(layer, 1)).write().to_buffered(&mut file).unwrap();
+            let (picture, left_out) = decode(&file.into_inner(), 100).unwrap();
+            let reds: Vec<f32> = picture.beauty.iter().map(|pixel| pixel[0]).collect();
+            (picture, reds, left_out)
+        };
+        let (same, reds, left_out) = of((-4, 9), ((-4, 9), (3, 2)));
+        assert_eq!(((same.width, same.height), reds), ((3, 2), vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
+        assert!(left_out.is_empty());
+
+        let (within, reds, left_out) = of((-3, 10), ((-4, 9), (5, 3)));
+        assert_eq!((within.width, within.height), (5, 3));
+        let clear = 0.0;
+        assert_eq!(reds[..5], [clear; 5]);
+        assert_eq!(reds[5..], [clear, 1.0, 2.0, 3.0, clear, clear, 4.0, 5.0, 6.0, clear]);
+        let layers = within.layers.unwrap();
+        assert_eq!((within.beauty[6], within.beauty[4]), ([1.0, 0.0, 0.0, 1.0], [0.0; 4]));
+        assert_eq!((layers.depth[6], layers.depth[4], layers.prim[6]), (1.0, f32::INFINITY, 7));
+        assert_eq!((layers.prim[4], left_out.len()), (u32::MAX, 0));
+
+        let (across, reds, left_out) = of((1, -1), ((0, 0), (2, 2)));
+        assert_eq!((across.width, reds), (2, vec![clear, 4.0, clear, clear]));
+        assert_eq!(left_out, ["pixels outside of the display window"]);
     }
 
     #[test]

@@ -111,7 +111,7 @@ fn compared(args: &DiffArgs, messages: &Messages) -> Result<Compared, Fault> {
     let [ours, theirs] = [&expected, &actual].map(|picture| picture.layers.as_ref().unwrap_or(&none));
     let (layers, layers_of_one) = layer_differences(ours, theirs);
     let shown = |picture: Picture, kind| match space {
-        Space::Display if kind == FileKind::Exr => developed(&picture, &development(args)),
+        Space::Display if kind == FileKind::Exr => displayed(&picture, &development(args)),
         _ => picture,
     };
     let (expected, actual) = (shown(expected, kinds[0]), shown(actual, kinds[1]));
@@ -146,6 +146,14 @@ fn told_left_out(files: [(&PathBuf, &PictureFile); 2], messages: &Messages) -> V
         format!("{}: {what}", path.display())
     })
     .collect()
+}
+
+/// A picture as light of the display. What is no number stays so, though a picture shows something there: it is an error.
+fn displayed(picture: &Picture, development: &Output) -> Picture {
+    let mut shown = developed(picture, development);
+    let broken = picture.beauty.iter().map(|pixel| pixel.iter().any(|c| c.is_nan()));
+    shown.beauty.iter_mut().zip(broken).filter(|(_, broken)| *broken).for_each(|(pixel, _)| *pixel = [f32::NAN; 4]);
+    shown
 }
 
 /// How EXR files become display colour.

@@ -4,8 +4,7 @@ use super::Compared;
 use super::args::DiffArgs;
 use crate::cli::version::SHORT;
 use crate::image::Picture;
-use crate::image::diff::{LayerDifference, Space};
-use crate::image::srgb;
+use crate::image::diff::{LayerDifference, Space, values};
 use crate::number::grouped;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -129,22 +128,19 @@ fn compared_values(compared: &Compared, side: Side) -> Vec<f64> {
     };
     let (x, y) = compared.difference.worst;
     let pixel = picture.beauty.get(y as usize * picture.width as usize + x as usize).copied().unwrap_or_default();
-    let coded = |(k, c): (usize, f32)| match compared.space {
-        Space::Display if k < 3 => srgb::encode(f64::from(c).clamp(0.0, 1.0)),
-        _ => f64::from(c),
-    };
-    pixel.into_iter().enumerate().map(coded).take(compared.difference.channels as usize).collect()
+    values(pixel, compared.space).into_iter().take(compared.difference.channels as usize).collect()
 }
 
 fn at(compared: &Compared, side: Side) -> String {
-    compared_values(compared, side).into_iter().map(|v| format!("{v:.4}")).collect::<Vec<_>>().join(" ")
+    compared_values(compared, side).into_iter().map(figure).collect::<Vec<_>>().join(" ")
 }
 
 /// A ratio of signal to noise.
 fn decibels(psnr: f64) -> String {
     match psnr {
         f64::INFINITY => "infinite: the colours are equal".into(),
-        finite if finite.is_finite() => format!("{finite:.2} dB"),
+        // No sign where it rounds to nothing.
+        finite if finite.is_finite() => format!("{:.2} dB", (finite * 100.0).round() / 100.0 + 0.0),
         other => figure(other),
     }
 }
@@ -173,7 +169,10 @@ mod tests {
     #[test]
     fn what_is_no_finite_number_is_called_what_it_is() {
         assert_eq!([f64::NAN, f64::NEG_INFINITY].map(figure), ["not defined", "-infinite"]);
-        let ratios = [f64::INFINITY, 30.0, f64::NEG_INFINITY, f64::NAN].map(decibels);
-        assert_eq!(ratios, ["infinite: the colours are equal", "30.00 dB", "-infinite", "not defined"]);
+        let ratios = [f64::INFINITY, 30.0, -0.0, -0.001, f64::NEG_INFINITY, f64::NAN].map(decibels);
+        assert_eq!(
+            ratios,
+            ["infinite: the colours are equal", "30.00 dB", "0.00 dB", "0.00 dB", "-infinite", "not defined"]
+        );
     }
 }

@@ -57,10 +57,9 @@ pub fn compare(expected: &Picture, actual: &Picture, space: Space, threshold: f6
     let (mut sum, mut energy, mut bias) = (0.0, 0.0, 0.0);
     let (mut max, mut worst, mut over) = (0.0_f64, 0, 0);
     for (i, (&a, &b)) in expected.beauty.iter().zip(&actual.beauty).enumerate() {
-        let (a, b) = (values(a, space), values(b, space));
+        let (differences, a, b) = (channel_differences(a, b, space), values(a, space), values(b, space));
         let mut most = 0.0_f64;
-        for c in 0..channels {
-            let d = distance(a[c], b[c]);
+        for (c, d) in differences.into_iter().enumerate().take(channels) {
             sum += d * d;
             energy += if a[c].is_finite() { a[c] * a[c] } else { 0.0 };
             bias += if c < 3 && d > 0.0 { b[c] - a[c] } else { 0.0 };
@@ -111,8 +110,8 @@ fn place(pixel: usize, width: u32) -> (u32, u32) {
 }
 
 fn channel_differences(a: [f32; 4], b: [f32; 4], space: Space) -> [f64; 4] {
-    let (a, b) = (values(a, space), values(b, space));
-    std::array::from_fn(|i| distance(a[i], b[i]))
+    let ((a, steps), (b, _)) = (in_steps(a, space), in_steps(b, space));
+    std::array::from_fn(|i| distance(a[i], b[i]) / steps)
 }
 
 fn distance(a: f64, b: f64) -> f64 {
@@ -124,11 +123,27 @@ fn distance(a: f64, b: f64) -> f64 {
     }
 }
 
-fn values([r, g, b, a]: [f32; 4], space: Space) -> [f64; 4] {
-    let coded = |c: f32| srgb::encode(f64::from(c).clamp(0.0, 1.0));
+/// The values of a pixel that are compared.
+pub fn values(pixel: [f32; 4], space: Space) -> [f64; 4] {
+    let (values, steps) = in_steps(pixel, space);
+    values.map(|value| value / steps)
+}
+
+/// The values of a pixel that are compared, and of how many steps 1 is made. Codes of 8 and of 16 bits are whole numbers of
+/// steps: equal differences of theirs are equal numbers, though they were light in between.
+fn in_steps([r, g, b, a]: [f32; 4], space: Space) -> ([f64; 4], f64) {
+    /// Of the codes of 16 bits.
+    const STEPS: f64 = 65535.0;
+    /// More than light in single precision makes of a code, in steps.
+    const ROUNDING: f64 = 0.01;
+    let stepped = |code: f64| {
+        let (steps, whole) = (code * STEPS, (code * STEPS).round());
+        if (steps - whole).abs() < ROUNDING { whole } else { steps }
+    };
+    let coded = |c: f32| stepped(srgb::encode(f64::from(c).clamp(0.0, 1.0)));
     match space {
-        Space::Linear => [r, g, b, a].map(f64::from),
-        Space::Display => [coded(r), coded(g), coded(b), f64::from(a)],
+        Space::Linear => ([r, g, b, a].map(f64::from), 1.0),
+        Space::Display => ([coded(r), coded(g), coded(b), stepped(f64::from(a))], STEPS),
     }
 }
 
@@ -215,6 +230,26 @@ mod tests {
     fn a_value_that_is_no_number_is_infinitely_wrong() {
         let d = compare(&of(&[[0.0; 4]]), &of(&[[f32::NAN, 0.0, 0.0, 0.0]]), Space::Display, 1e9).unwrap();
         assert_eq!((d.max, d.over), (f64::INFINITY, 1));
+    }
+
+    #[test]
+    fn codes_that_differ_by_one_differ_alike_whatever_they_are() {
+        let of = |first: u8| {
+            let pixel = |code: u8| {
+                let light = srgb::decode8(code);
+                [light, light, light, f32::from(code) / 255.0]
+            };
+            Picture::of(255, 1, (first..=first + 254).map(pixel).collect())
+        };
+        let d = compare(&of(0), &of(1), Space::Display, 1.0 / 255.0).unwrap();
+        assert_eq!((d.max, d.worst, d.over, d.channels), (1.0 / 255.0, (0, 0), 0, 4));
+        assert_eq!(compare(&of(0), &of(1), Space::Display, 0.003_921_5).unwrap().over, 255);
+        let wide = |first: u16| {
+            let light = |code: u16| srgb::decode(f64::from(code) / 65535.0) as f32;
+            Picture::of(65535, 1, (first..first + 65535).map(|code| [light(code), 0.0, 0.0, 1.0]).collect())
+        };
+        let d = compare(&wide(0), &wide(1), Space::Display, 1.0 / 65535.0).unwrap();
+        assert_eq!((d.max, d.over), (1.0 / 65535.0, 0));
     }
 
     #[test]
