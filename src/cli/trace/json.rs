@@ -46,6 +46,9 @@ fn query(told: &Told, i: usize) -> Value {
     set("origin", in_world(told.world, query.ray.origin).to_array().to_vec().into());
     set("direction", query.ray.dir.to_array().to_vec().into());
     set("t_min", query.ray.t_min.into());
+    if i == 0 {
+        set("skipped", told.skipped().into());
+    }
     // Infinite where there is no end; JSON has no number for that.
     set("t_max", Some(query.ray.t_max).filter(|t| t.is_finite()).into());
     if query.after.is_some() {

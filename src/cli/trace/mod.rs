@@ -9,6 +9,7 @@
 //! |---|---|
 //! | `class`, `question` | `primary`, `shadow`, `reflected`, `refracted`; `closest`, `occluded` (does anything stop its light), `next` (what is behind `after`) |
 //! | `origin`, `direction`, `t_min`, `t_max` | the ray, in world space; `t_max` is `null` where it has no end |
+//! | `skipped` | of the eye ray: how far before `origin`, where t is 0, the eye is; more than 0 where it is so far away that rays start just before the scene |
 //! | `light`, `riser`, `after` | what a shadow ray looks for; whether it leads only up to where another one starts, above a surface that stands for a round one; `t` and `prim` of the hit behind which the search went on |
 //! | `counts` | `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf` of this query |
 //! | `hit` | `t`, `u`, `v`, `prim`, `object`, `material`, `position`, `normal` (geometric); `null`: nothing; of `occluded` the first prim found in the way |
@@ -36,7 +37,7 @@ use crate::image::{FileKind, Metadata};
 use crate::load::{Diagnostic, Loaded};
 use crate::render::story::{Story, tell};
 use crate::render::texture::TextureStore;
-use crate::render::{Instancing, Job, Settings, World};
+use crate::render::{Instancing, Job, Settings, View, World};
 pub(super) use args::TraceArgs;
 use std::path::Path;
 
@@ -47,7 +48,8 @@ struct Told<'a> {
     world: &'a World,
     accel: AccelKind,
     settings: &'a Settings,
-    /// In words.
+    eye: &'a View,
+    /// The same in words.
     view: &'a str,
     pixel: (u32, u32),
     sample: u32,
@@ -126,6 +128,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
         world: &world,
         accel: accel.kind(),
         settings,
+        eye: &view,
         view: &view_phrase,
         pixel: args.pixel,
         sample: args.sample,
@@ -180,6 +183,17 @@ impl Told<'_> {
             self.accel,
             crate::number::grouped(self.world.len() as u64)
         )
+    }
+
+    /// How far the eye is behind where its ray starts: far ones start theirs just before the scene.
+    fn skipped(&self) -> f64 {
+        let Some(ray) = self.story.queries.first().map(|query| query.ray) else { return 0.0 };
+        let View { eye, forward, .. } = self.eye;
+        // Along the view: rays of parallel projections, and those through a lens, start beside the eye.
+        let distance =
+            (words::in_world(self.world, ray.origin) - *eye).dot(*forward) / ray.dir.as_dvec3().dot(*forward);
+        // More than the rounding of an origin.
+        if distance > 1e-5 * eye.distance(self.world.center) { distance } else { 0.0 }
     }
 
     fn color(&self) -> String {

@@ -3,7 +3,7 @@
 use super::Told;
 use super::words::{goes_on, in_world, inside, light, object, place};
 use crate::accel::probe::{Extent, Outcome, Place, Visit};
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
 use crate::number::grouped;
 use crate::render::Question;
 use crate::render::story::{Class, Event, Query};
@@ -37,7 +37,7 @@ fn tell(told: &Told, i: usize, depth: usize, out: &mut String) {
 
 fn headline(told: &Told, query: &Query) -> String {
     let scene = &told.loaded.scene;
-    let from = format!("from {} towards {}", point(in_world(told.world, query.ray.origin)), vector(query.ray.dir));
+    let from = format!("from {} towards {}", place_in(told, query.ray.origin), vector(query.ray.dir));
     match (query.class, query.question) {
         (class, Question::Next) => format!("{} ray goes on behind prim {}", class.name(), query.after.prim),
         (Class::Shadow, Question::Occluded) if query.riser => {
@@ -46,7 +46,10 @@ fn headline(told: &Told, query: &Query) -> String {
         }
         (Class::Shadow, Question::Occluded) => format!("shadow ray to {} {from}", light(scene, query.light)),
         (Class::Shadow, Question::Closest) => "shadow ray looks for what lets light through".into(),
-        (Class::Primary, _) => format!("eye ray {from}"),
+        (Class::Primary, _) => match told.skipped() {
+            0.0 => format!("eye ray {from}"),
+            skipped => format!("eye ray {from}, where t is 0: the eye is {} farther back", real(skipped)),
+        },
         (class, _) => format!("{} ray {from}", class.name()),
     }
 }
@@ -72,7 +75,7 @@ fn ending(told: &Told, query: &Query) -> String {
         query.hit.t,
         place.weights[0],
         place.weights[1],
-        point(place.position),
+        point(place.position, resolution(told)),
         vector(place.normal)
     )
 }
@@ -124,8 +127,18 @@ fn visit(told: &Told, query: &Query, visit: &Visit) -> String {
     let bounds = visit.extent.bounds();
     let inside =
         inside(&visit.extent, &query.ray).map_or(String::new(), |(a, b)| format!(", t {} to {}", real(a), real(b)));
-    let (lo, hi) = (in_world(told.world, bounds.lo), in_world(told.world, bounds.hi));
-    format!("{what}{listed}{inside}, {} to {}", point(lo), point(hi))
+    format!("{what}{listed}{inside}, {} to {}", place_in(told, bounds.lo), place_in(told, bounds.hi))
+}
+
+/// A place of the centred frame, in the world.
+fn place_in(told: &Told, place: Vec3) -> String {
+    point(in_world(told.world, place), resolution(told))
+}
+
+/// A length that matters for places in the world: a millionth of it.
+fn resolution(told: &Told) -> f64 {
+    let (lo, hi) = told.world.bounds;
+    1e-6 * (hi - lo).max_element()
 }
 
 /// Tests of one outcome in a row, gathered into one line.
@@ -184,30 +197,44 @@ fn ranges(numbers: &[u32]) -> String {
     parts.iter().map(part).collect::<Vec<_>>().join(", ")
 }
 
-fn vector(v: crate::math::Vec3) -> String {
-    point(v.as_dvec3())
+fn vector(v: Vec3) -> String {
+    point(v.as_dvec3(), f64::INFINITY)
 }
 
-fn point(p: DVec3) -> String {
-    format!("({}, {}, {})", real(p.x), real(p.y), real(p.z))
+/// A point with what is no less than `resolution`, and with six digits at least.
+fn point(p: DVec3, resolution: f64) -> String {
+    let [x, y, z] = p.to_array().map(|x| resolved(x, resolution));
+    format!("({x}, {y}, {z})")
 }
 
 /// Six digits, without zeros behind.
 fn real(x: f64) -> String {
+    resolved(x, f64::INFINITY)
+}
+
+/// The same with more digits where six do not tell what is no less than `resolution`.
+fn resolved(x: f64, resolution: f64) -> String {
     if x == 0.0 {
         return "0".into();
     }
     if !x.is_finite() {
         return x.to_string();
     }
-    #[expect(clippy::cast_possible_truncation, reason = "a decimal exponent of f64")]
-    let whole = x.abs().log10().floor() as i32;
-    if !(-5..=8).contains(&whole) {
-        return format!("{x:.5e}");
-    }
-    let digits = usize::try_from(5 - whole).unwrap_or(0);
-    let text = format!("{x:.digits$}");
+    let (whole, finest) = (exponent(x), if resolution > 0.0 { exponent(resolution) } else { i32::MAX });
+    // As many as numbers have.
+    let digits = (whole - finest).clamp(5, 16);
+    let text = match usize::try_from(digits - whole) {
+        Ok(places) if whole >= -5 && (whole <= 8 || places > 0) => format!("{x:.places$}"),
+        _ if (-5..=8).contains(&whole) => format!("{x:.0}"),
+        _ => return format!("{x:.digits$e}", digits = digits.unsigned_abs() as usize),
+    };
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// The power of ten of the first digit of a number that is not 0.
+#[expect(clippy::cast_possible_truncation, reason = "a decimal exponent of f64")]
+fn exponent(x: f64) -> i32 {
+    if x.is_finite() { x.abs().log10().floor() as i32 } else { i32::MAX / 2 }
 }
 
 #[cfg(test)]
@@ -223,5 +250,17 @@ mod tests {
     fn numbers_have_six_digits_at_most() {
         let texts = [0.0, 1.0, -0.123_456_789, 1234.5, 1.5e-7, 123_456_789.0, 2e12].map(real);
         assert_eq!(texts, ["0", "1", "-0.123457", "1234.5", "1.50000e-7", "123456789", "2.00000e12"]);
+    }
+
+    #[test]
+    fn places_far_away_have_the_digits_that_their_scene_needs() {
+        let of = |x: f64, size: f64| resolved(x, 1e-6 * size);
+        assert_eq!(
+            [of(3_000_000.125, 1.0), of(2_000_000.5, 1.0), of(-1e6, 1.0)],
+            ["3000000.125", "2000000.5", "-1000000"]
+        );
+        assert_eq!([of(0.123_456_789, 1.0), of(1234.5678, 1e9), of(1e-9, 1.0)], ["0.123457", "1234.57", "1.00000e-9"]);
+        assert_eq!([of(1.5e12, 1e3), of(123_456_789_012.5, 1e5)], ["1500000000000", "123456789012.5"]);
+        assert_eq!([of(1e30, 1.0), of(2e12, 1e13), of(5.0, 0.0)], ["1.0000000000000000e30", "2.00000e12", "5"]);
     }
 }
