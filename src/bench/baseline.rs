@@ -73,6 +73,14 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
     if before != seed {
         return Err(format!("its rays are those of seed {before}, not {seed}"));
     }
+    if let Some(name) = STRUCTURES.into_iter().find(|name| otherwise(baseline, now, "settings", name)) {
+        let [before, now] = [baseline, now].map(|report| &report["settings"][name]);
+        return Err(format!("its structures are those of {name} {before}, not {now}"));
+    }
+    if baseline["sweep"] != now["sweep"] {
+        let [before, now] = [baseline, now].map(|report| &report["sweep"]["parameter"]);
+        return Err(format!("it sweeps another parameter, or other values of it ({before} before, {now} now)"));
+    }
     let (all, mut found, mut lines) = (items(&baseline["models"]), Vec::new(), Vec::new());
     if let Some(limit) =
         limits.iter().find(|limit| !all.is_empty() && !all.iter().any(|model| counts(model, &limit.name)))
@@ -83,8 +91,13 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
         let at = earlier(all, &found, model)?;
         found.push(at);
         let (before, name) = (&all[at], called(all, &all[at]));
-        let alike =
-            [("hash", "a different file"), ("picture", "a different picture"), ("rays", "different numbers of rays")];
+        let alike = [
+            ("hash", "a different file"),
+            ("prims", "another number of prims"),
+            ("objects", "another number of objects"),
+            ("picture", "a different picture"),
+            ("rays", "different numbers of rays"),
+        ];
         for (key, what) in alike {
             let [before, now] = [before, model].map(|model| &model[key]);
             if !is_same(before, now) {
@@ -98,8 +111,8 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
             return Err(format!("{name}: the baseline was made with {before} instances kept, not with {now}"));
         }
         for row in items(&before["structures"]) {
-            let current = items(&model["structures"]).iter().find(|r| r["accel"] == row["accel"]);
-            let place = format!("{name}, {}", row["accel"].as_str().unwrap_or_default());
+            let current = items(&model["structures"]).iter().find(|current| is_one_structure(row, current));
+            let place = format!("{name}, {}", structure(row));
             if let Some(sampled) = current.and_then(|current| sampled_otherwise(row, current)) {
                 let [before, now] = [baseline, now].map(|report| &report["settings"]["slow_tests"]);
                 return Err(format!("{place}: {sampled} (tests of slow structures: {before} before, {now} now)"));
@@ -109,9 +122,9 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
                 None => lines.push(format!("{place}: in the baseline, but not measured now")),
             }
         }
-        let known = |row: &&Value| items(&before["structures"]).iter().any(|earlier| earlier["accel"] == row["accel"]);
+        let known = |row: &&Value| items(&before["structures"]).iter().any(|earlier| is_one_structure(earlier, row));
         let new = items(&model["structures"]).iter().filter(|row| !known(row));
-        let new: Vec<&str> = new.filter_map(|row| row["accel"].as_str()).collect();
+        let new: Vec<String> = new.map(structure).collect();
         if !new.is_empty() {
             return Err(format!("{name}: the baseline has no rows for {}", new.join(", ")));
         }
@@ -119,6 +132,35 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
     let missing = all.iter().enumerate().filter(|(at, _)| !found.contains(at));
     lines.extend(missing.map(|(_, model)| format!("{}: in the baseline, but not measured now", called(all, model))));
     Ok(lines)
+}
+
+/// What is asked of structures, among the settings.
+const STRUCTURES: [&str; 9] = [
+    "grid_density",
+    "grid_resolution",
+    "max_depth",
+    "step_cost",
+    "leaf_size",
+    "grid_cells",
+    "max_references",
+    "assign",
+    "mailbox",
+];
+
+/// Whether an entry of a part of two reports differs that the earlier one has.
+fn otherwise(before: &Value, now: &Value, part: &str, name: &str) -> bool {
+    before[part].get(name).is_some_and(|before| *before != now[part][name])
+}
+
+/// Whether two rows are of one structure, with the same value of what is swept.
+fn is_one_structure(before: &Value, now: &Value) -> bool {
+    before["accel"] == now["accel"] && before["setting"]["value"] == now["setting"]["value"]
+}
+
+/// The structure of a row, with its value of what is swept.
+fn structure(row: &Value) -> String {
+    let name = row["accel"].as_str().unwrap_or_default();
+    if row["setting"].is_object() { format!("{name} with {}", row["setting"]["value"]) } else { name.to_owned() }
 }
 
 /// Whether two values are the same, or, of objects, whatever the earlier one has.
@@ -288,6 +330,41 @@ mod tests {
         let limits = ["n_xf>+1%".parse().unwrap()];
         let error = failures(&before, &now, &limits).unwrap_err();
         assert!(error.starts_with("it has no n_xf: "), "{error}");
+    }
+
+    #[test]
+    fn a_baseline_of_other_structures_or_other_geometry_is_none_and_one_of_a_sweep_is_compared_value_by_value() {
+        let (before, now) = (report(1.0, 1), report(1.0, 1));
+        let mut told = before.clone();
+        told["settings"] = json!({ "seed": before["settings"]["seed"], "mailbox": "none" });
+        let mut exact = told.clone();
+        exact["settings"]["mailbox"] = "exact".into();
+        let error = failures(&told, &exact, &[]).unwrap_err();
+        assert_eq!(error, "its structures are those of mailbox \"none\", not \"exact\"");
+        assert_eq!(failures(&before, &exact, &[]), Ok(Vec::new()), "a report that does not say so");
+
+        let mut whole = before.clone();
+        whole["models"][0]["prims"] = 7.into();
+        let error = failures(&whole, &now, &[]).unwrap_err();
+        assert!(error.contains("another number of prims (7 before"), "{error}");
+
+        let swept = |tests: [f64; 2]| {
+            let mut report = before.clone();
+            let row = report["models"][0]["structures"][0].clone();
+            report["sweep"] = json!({ "parameter": "grid-density", "values": [4.0, 8.0] });
+            let rows = [4.0, 8.0].into_iter().zip(tests).map(|(value, tests)| {
+                let mut row = row.clone();
+                row["setting"] = json!({ "value": value, "is_default": value == 4.0 });
+                row["classes"]["shadow"]["per_ray"]["n_it"] = tests.into();
+                row
+            });
+            report["models"][0]["structures"] = rows.collect();
+            report
+        };
+        assert!(failures(&swept([1.0, 2.0]), &now, &[]).unwrap_err().contains("sweeps another parameter"));
+        assert_eq!(judged(&swept([1.0, 2.0]), &swept([1.0, 2.0]), &["n_it>+1%", "n_it<-1%"]), [""; 0]);
+        let lines = judged(&swept([1.0, 2.0]), &swept([1.0, 3.0]), &["n_it>+1%"]);
+        assert!(lines.len() == 1 && lines[0].contains("grid with 8.0, shadow: n_it 3"), "{lines:?}");
     }
 
     #[test]

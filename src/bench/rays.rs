@@ -111,13 +111,16 @@ fn even_places(len: usize, count: usize, seed: u64) -> Vec<usize> {
 /// that was used; `None` when the rendering could not be done.
 pub fn record(job: &Job, limit: usize, seed: u64) -> Option<(Vec<RaySet>, u32)> {
     let (rendered, recording) = render_recorded(job, &())?;
-    let diffuse = diffuse(job, recording.primary.rays(Question::Closest), seed);
+    let eye = recording.primary.rays(Question::Closest);
+    let diffuse = diffuse(job, eye, seed);
+    // The tape may have kept a part of what the eye sent.
+    let bounces = diffuse.rays.len() as u64 * recording.primary.total(Question::Closest) / (eye.len() as u64).max(1);
     let mut sets = vec![
-        set(Class::Primary, &recording.primary),
-        set(Class::Shadow, &recording.shadow),
-        set(Class::Reflected, &recording.reflected),
-        set(Class::Refracted, &recording.refracted),
-        RaySet { class: Class::Diffuse, asked: diffuse.rays.len() as u64, batches: vec![diffuse] },
+        set(Class::Primary, &recording.primary, seed),
+        set(Class::Shadow, &recording.shadow, seed),
+        set(Class::Reflected, &recording.reflected, seed),
+        set(Class::Refracted, &recording.refracted, seed),
+        RaySet { class: Class::Diffuse, asked: bounces, batches: vec![diffuse] },
     ];
     sets.retain(|set| !set.is_empty());
     for set in sets.iter_mut().filter(|set| set.len() > limit) {
@@ -126,8 +129,19 @@ pub fn record(job: &Job, limit: usize, seed: u64) -> Option<(Vec<RaySet>, u32)> 
     Some((sets, rendered.depth))
 }
 
-fn set(class: Class, tape: &Tape) -> RaySet {
-    let batch = |question| Batch::new(question, tape.rays(question));
+/// The rays of a class; of each question the same part, that of which the tape has kept the least.
+fn set(class: Class, tape: &Tape, seed: u64) -> RaySet {
+    let parts = Question::ALL.map(|q| (tape.rays(q).len() as u64, tape.total(q)));
+    let (kept, of) = parts.into_iter().filter(|part| part.1 > 0).fold((1, 1), |least, part| {
+        if u128::from(part.0) * u128::from(least.1) < u128::from(least.0) * u128::from(part.1) { part } else { least }
+    });
+    #[expect(clippy::cast_possible_truncation, reason = "no more than are kept")]
+    let share = |total: u64| (u128::from(total) * u128::from(kept) / u128::from(of)) as usize;
+    let batch = |question| {
+        let all = Batch::new(question, tape.rays(question));
+        let count = share(tape.total(question));
+        if count < all.rays.len() { all.pick(&even_places(all.rays.len(), count, seed)) } else { all }
+    };
     let batches = Question::ALL.into_iter().map(batch).filter(|b| !b.rays.is_empty()).collect();
     RaySet { class, asked: Question::ALL.into_iter().map(|q| tape.total(q)).sum(), batches }
 }

@@ -35,8 +35,8 @@ impl Row {
     }
 
     /// Seconds for a ray of a mixture with so many of each class, of each class's passes `pick`; NaN before the first pass.
-    pub fn seconds_per_ray(&self, mixture: &[usize], pick: fn(&Spread) -> f64) -> f64 {
-        let all: usize = mixture.iter().sum();
+    pub fn seconds_per_ray(&self, mixture: &[u64], pick: fn(&Spread) -> f64) -> f64 {
+        let all: u64 = mixture.iter().sum();
         let sum: f64 = self.classes.iter().zip(mixture).map(|(c, &n)| pick(&c.seconds) * n as f64).sum();
         sum / all as f64
     }
@@ -111,9 +111,9 @@ impl ClassRow {
         if prims == 0 { 0.0 } else { 1.0 - self.per_ray(Count::It) / prims as f64 }
     }
 
-    /// Millions of rays a second.
-    pub fn rate(&self) -> Spread {
-        self.seconds.map(|s| 1e-6 / s)
+    /// Millions of rays a second: in the median of the times, in the longest and in the shortest.
+    pub fn rates(&self) -> [f64; 3] {
+        [self.seconds.median(), self.seconds.max(), self.seconds.min()].map(|seconds| 1e-6 / seconds)
     }
 
     /// Counts another ray.

@@ -3,9 +3,9 @@
 //! # Schema `meshray-explain/1`
 //! One JSON object: `version`, `file`, `hash`, `view`, `width`, `height`, `accel`, `prims` (N); `usual` by ray class
 //! (`primary`, `shadow`, `reflected`, `refracted`) and `all`, each with `rays`, `tests` (ray/prim), `steps` (nodes and cells
-//! visited) and `cost` (tests and steps); `causes`, the greatest saving first, each with `cause`, `evidence`, `remedy`,
-//! `saving` (a share of the cost; negative where it grows), `keeps_the_picture` and `without` (as `usual`). Keys are only
-//! ever added.
+//! visited), `transforms` (points) and `cost` (all three); `causes`, the greatest saving first, each with `cause`, `evidence`,
+//! `remedy`, `saving` (a share of the cost; negative where it grows), `keeps_the_picture`, `drawn_anew` (whether some of the
+//! saving is chance: rough surfaces scatter other rays) and `without` (as `usual`). Keys are only ever added.
 
 use super::args::ExplainArgs;
 use super::exit::Exit;
@@ -14,14 +14,11 @@ use super::message::Messages;
 use super::seen::{self, Seen};
 use super::{accident, interrupt};
 use crate::accel::{AccelParams, auto};
-use crate::bench::explain::{Bill, Case, Finding, Work, explain};
+use crate::bench::explain::{Bill, Case, Finding, WORTH, Work, explain};
 use crate::number::{grouped, short};
 use crate::render::{CLASS_NAMES, Settings};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
-
-/// A saving below this is not worth a change.
-const WORTH: f64 = 0.02;
 
 /// Loads the model, tries every cause and prints what was found.
 pub(super) fn run(args: &ExplainArgs) -> Exit {
@@ -74,25 +71,37 @@ impl Told<'_> {
         let Settings { width, height, .. } = self.case.settings;
         let pixels = f64::from(width) * f64::from(height);
         let all = self.usual.sum();
+        let transforms = match all.transforms {
+            0 => String::new(),
+            n => format!(", for which {} points are transformed", short(n as f64 / pixels)),
+        };
         let mut out = format!(
-            "{}: {} prims in {}; {width}×{height}, {}\na pixel takes {} ray/prim tests and visits {} nodes and cells:\n",
+            "{}: {} prims in {}; {width}×{height}, {}\na pixel takes {} ray/prim tests and visits {} nodes and cells{}:\n",
             self.name,
             grouped(self.prims as u64),
             self.case.accel,
             self.view,
             short(all.tests as f64 / pixels),
             short(all.steps as f64 / pixels),
+            transforms,
         );
         for (name, work) in CLASS_NAMES.iter().zip(&self.usual.0).filter(|(_, work)| work.rays > 0) {
             let share = 100.0 * work.cost() as f64 / all.cost().max(1) as f64;
             let _ = writeln!(out, "  {share:3.0} % for {} {name} rays", grouped(work.rays));
         }
-        let worth: Vec<&Finding> = self.findings.iter().filter(|f| f.saving >= WORTH).collect();
+        let worth: Vec<&Finding> = self.findings.iter().filter(|f| f.is_worth_it()).collect();
         if worth.is_empty() {
-            out += "\nnothing that was tried would save 2 % of this\n";
+            let least = short(100.0 * WORTH);
+            let _ = writeln!(out, "\nnothing that was tried would save {least} % of this");
         }
         for (number, finding) in (1..).zip(&worth) {
-            let but = if finding.cause.keeps_the_picture() { "" } else { "; changes the picture" };
+            let but = match (finding.cause.keeps_the_picture(), finding.is_drawn_anew) {
+                (false, _) => "; changes the picture",
+                (true, false) => "",
+                (true, true) => {
+                    "; what rough surfaces scatter is drawn anew without it, so that some of this is chance"
+                }
+            };
             let _ = writeln!(
                 out,
                 "\n{number}. {}: {:.0} % of the cost, counted without it\n   {}\n   remedy: {}{but}",
@@ -103,7 +112,7 @@ impl Told<'_> {
             );
         }
         let idle: Vec<String> =
-            self.findings.iter().filter(|f| f.saving < WORTH).map(|f| f.cause.to_string()).collect();
+            self.findings.iter().filter(|f| !f.is_worth_it()).map(|f| f.cause.to_string()).collect();
         if !idle.is_empty() && !worth.is_empty() {
             let _ = writeln!(out, "\nno use to change: {}", idle.join(", "));
         }
@@ -114,7 +123,7 @@ impl Told<'_> {
         let cause = |f: &Finding| {
             json!({
                 "cause": f.cause.name(), "evidence": f.evidence, "remedy": f.remedy, "saving": f.saving,
-                "keeps_the_picture": f.cause.keeps_the_picture(), "without": bill(&f.without),
+                "keeps_the_picture": f.cause.keeps_the_picture(), "drawn_anew": f.is_drawn_anew, "without": bill(&f.without),
             })
         };
         let value = json!({
@@ -135,7 +144,7 @@ impl Told<'_> {
 }
 
 fn bill(bill: &Bill) -> Value {
-    let work = |w: &Work| json!({"rays": w.rays, "tests": w.tests, "steps": w.steps, "cost": w.cost()});
+    let work = |w: &Work| json!({"rays": w.rays, "tests": w.tests, "steps": w.steps, "transforms": w.transforms, "cost": w.cost()});
     let mut classes: Map<String, Value> =
         CLASS_NAMES.iter().zip(&bill.0).map(|(name, w)| ((*name).to_owned(), work(w))).collect();
     classes.insert("all".into(), work(&bill.sum()));

@@ -6,7 +6,7 @@ use crate::image::diff::PIXELS_PER_DEGREES;
 use crate::math::Vec3;
 use crate::math::simd::{Level, UnknownLevel};
 use crate::named::{Named, UnknownName};
-use crate::render::Cost;
+use crate::render::{Cost, Tape};
 use crate::scene::{Background, Environment, MAX_DEPTH, MAX_STOPS};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::fmt;
@@ -253,7 +253,22 @@ pub(super) fn bits(text: &str) -> Result<u8, String> {
 
 /// A number of things, at least one.
 pub(super) fn positive(text: &str) -> Result<usize, String> {
-    text.parse().ok().filter(|&n| n > 0).ok_or_else(|| "write a number from 1".into())
+    text.parse().ok().or_else(|| in_powers(text)).filter(|&n| n > 0).ok_or_else(|| "write a number from 1".into())
+}
+
+/// A number of rays of a class of which a recording has as many, or all.
+pub(super) fn rays(text: &str) -> Result<usize, String> {
+    const MOST: usize = Tape::LIMIT / 2;
+    positive(text).ok().filter(|&n| n <= MOST).ok_or_else(|| format!("write a number from 1 to {MOST}"))
+}
+
+/// A whole number written as `1e6`.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
+fn in_powers(text: &str) -> Option<usize> {
+    /// Beyond this not all whole numbers are there.
+    const MOST: f64 = (1_u64 << 53) as f64;
+    let number = text.parse::<f64>().ok().filter(|n| n.fract() == 0.0 && (0.0..=MOST).contains(n))?;
+    usize::try_from(number as u64).ok()
 }
 
 /// A number of triangles that a scene can be generated with, also as `1e6`.

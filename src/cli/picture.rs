@@ -57,6 +57,11 @@ impl Effective {
     }
 }
 
+/// How wide points or lines so narrow are, pixels, in a picture of a model about so large, both in world units.
+pub(super) fn wide_in_pixels(narrowest: f64, size: f64, settings: &Settings) -> f64 {
+    narrowest / size * f64::from(settings.height.min(settings.width))
+}
+
 impl Effective {
     /// The same for a picture that is written as this kind of file: errors are counted in what it holds.
     pub(super) fn written_as(&mut self, look: &Look, kind: FileKind) {
@@ -65,7 +70,7 @@ impl Effective {
 
     /// The same for a picture of a model about so large that has points or lines so narrow, world units.
     pub(super) fn of_wires(&mut self, look: &Look, narrowest: f64, size: f64) {
-        let pixels = narrowest / size * f64::from(self.settings.height.min(self.settings.width));
+        let pixels = wide_in_pixels(narrowest, size, &self.settings);
         self.settings.sampling = look.sampling.of_wires(self.settings.sampling, pixels);
     }
 

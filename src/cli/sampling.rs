@@ -235,8 +235,8 @@ impl SamplingArgs {
     /// The same sampling for a picture of points and lines about so many pixels wide.
     pub(super) fn of_wires(&self, sampling: Sampling, pixels: f64) -> Sampling {
         match sampling {
-            Sampling::Stochastic(how) if self.min_samples.is_none() && pixels < NARROW => {
-                let min_samples = how.min_samples.max(FEWEST_OF_WIRES).min(how.max_samples);
+            Sampling::Stochastic(how) if self.min_samples.is_none() => {
+                let min_samples = how.min_samples.max(fewest_of_wires(pixels)).min(how.max_samples);
                 Sampling::Stochastic(Stochastic { min_samples, ..how })
             }
             _ => sampling,
@@ -273,6 +273,11 @@ impl SamplingArgs {
         let text = format!("the point to focus on is not in front of the camera: it lies {focus} along the view");
         Err(Diagnostic::new("focus", file, "", text).remedy("give a --focus that is in front of it"))
     }
+}
+
+/// The fewest samples of a pixel that points and lines about so many pixels wide need.
+pub(super) fn fewest_of_wires(pixels: f64) -> u32 {
+    if pixels < NARROW { FEWEST_OF_WIRES } else { 1 }
 }
 
 /// What `--error-space` is called.

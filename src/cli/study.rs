@@ -6,7 +6,7 @@ use super::job::Wrong;
 use super::message::Messages;
 use super::seen::{self, Seen};
 use super::writable::{self, Sources};
-use super::{accident, interrupt, meter, picture};
+use super::{accident, interrupt, meter, picture, sampling};
 use crate::accel::{AccelParams, auto};
 use crate::bench::study::report::{Format, text};
 use crate::bench::study::{Plan, Study, Subject, measure, reference, settings};
@@ -15,6 +15,7 @@ use crate::load::Diagnostic;
 use crate::render::texture::TextureStore;
 use crate::render::{Job, Settings};
 use crate::scene::Scene;
+use crate::scene::framing::robust_bounds;
 use crate::threads;
 use std::path::PathBuf;
 
@@ -57,8 +58,21 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
     let output = Output { tone_map, exposure: given.or(metered).unwrap_or(0.0), ..Output::default() };
     let output = picture::before(scene.background, output);
     let phrase = metered.map_or(phrase.clone(), |stops| format!("{phrase}, {}", meter::phrase(stops)));
-    let subject =
-        Subject { scene, world: &world, accel: &accel, textures: &textures, view: &view, base: &base, output: &output };
+    let wide = |narrowest: f64| {
+        let pixels = picture::wide_in_pixels(narrowest, 2.0 * robust_bounds(scene).radius(), &base);
+        sampling::fewest_of_wires(pixels)
+    };
+    let subject = Subject {
+        scene,
+        world: &world,
+        accel: &accel,
+        textures: &textures,
+        view: &view,
+        base: &base,
+        samples: scene.hints.samples,
+        fewest: loaded.facts.wires.narrowest().map_or(1, wide),
+        output: &output,
+    };
     let plan = Plan { passes: args.passes, reference_samples: args.reference_samples, seed: args.seed };
     let mut going = |done: u32, of: u32| {
         messages.info("progress", format!("{name}: the reference, part {} of {of}", done + 1));

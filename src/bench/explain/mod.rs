@@ -1,7 +1,7 @@
 //! Why a mesh costs what it costs: each cause that can be suspected is taken away, and what that saves is counted.
 //!
-//! A small picture is rendered as it is and once more without each suspected cause. Cost is the sum of ray/prim tests and
-//! of nodes and cells visited, of all rays: it depends on neither the machine nor the number of threads.
+//! A small picture is rendered as it is and once more without each suspected cause. Cost is the sum of ray/prim tests, of
+//! nodes and cells visited, and of points transformed, of all rays: it depends on neither the machine nor the number of threads.
 
 mod causes;
 mod mend;
@@ -98,16 +98,27 @@ pub struct Work {
     pub tests: u64,
     /// Nodes and cells visited.
     pub steps: u64,
+    /// Points transformed, which is what `transform` does for each prim before it tests it.
+    pub transforms: u64,
 }
 
 impl Work {
     fn of(counts: &RayCounts) -> Self {
-        Self { rays: counts.queries, tests: counts.n_it, steps: counts.n_ts }
+        Self { rays: counts.queries, tests: counts.n_it, steps: counts.n_ts, transforms: counts.n_xf }
     }
 
-    /// Tests and steps together.
+    /// Tests, steps and transforms together.
     pub fn cost(&self) -> u64 {
-        self.tests + self.steps
+        self.tests + self.steps + self.transforms
+    }
+
+    fn join(self, other: Self) -> Self {
+        Self {
+            rays: self.rays + other.rays,
+            tests: self.tests + other.tests,
+            steps: self.steps + other.steps,
+            transforms: self.transforms + other.transforms,
+        }
     }
 }
 
@@ -127,11 +138,15 @@ impl Bill {
         Self([primary, shadow, reflected, refracted].map(|class| Work::of(&class)))
     }
 
+    /// The cost of so many rays of each class.
+    fn cost_of(&self, rays: &[u64; 4]) -> f64 {
+        let cost = |(work, &rays): (&Work, &u64)| work.cost() as f64 * rays as f64 / work.rays.max(1) as f64;
+        self.0.iter().zip(rays).map(cost).sum()
+    }
+
     /// Of all classes.
     pub fn sum(&self) -> Work {
-        let add =
-            |a: Work, b: &Work| Work { rays: a.rays + b.rays, tests: a.tests + b.tests, steps: a.steps + b.steps };
-        self.0.iter().fold(Work::default(), add)
+        self.0.iter().copied().fold(Work::default(), Work::join)
     }
 }
 
@@ -159,9 +174,34 @@ pub struct Finding {
     pub remedy: String,
     /// What the picture takes without it.
     pub without: Bill,
-    /// The part of the cost that is saved, counted; negative where it grows.
+    /// The part of the cost that is saved, counted; negative where it grows. Where the picture stays what it is, of as many rays
+    /// of each class.
     pub saving: f64,
+    /// Whether the picture stays what it is but for what rough surfaces scatter, which is drawn anew: some of the saving is
+    /// chance then.
+    pub is_drawn_anew: bool,
 }
+
+impl Finding {
+    fn of(usual: &Bill, without: Bill, Suspect { cause, evidence, remedy, .. }: Suspect) -> Self {
+        let rays = |bill: &Bill| bill.0.map(|work| work.rays);
+        let keeps = cause.keeps_the_picture();
+        let cost: f64 = if keeps { without.cost_of(&rays(usual)) } else { without.sum().cost() as f64 };
+        let saving = 1.0 - cost / usual.sum().cost().max(1) as f64;
+        let is_drawn_anew = keeps && rays(&without) != rays(usual);
+        Self { cause, evidence, remedy, without, saving, is_drawn_anew }
+    }
+
+    /// Whether so much is saved that it matters, and is not chance alone.
+    pub fn is_worth_it(&self) -> bool {
+        /// What rays that are drawn anew have been seen to change.
+        const CHANCE: f64 = 0.1;
+        self.saving >= if self.is_drawn_anew { CHANCE } else { WORTH }
+    }
+}
+
+/// The least saving that is told.
+pub const WORTH: f64 = 0.02;
 
 /// Everything that can be suspected in a case.
 pub fn suspects(case: &Case) -> Vec<Suspect> {
@@ -172,13 +212,11 @@ pub fn suspects(case: &Case) -> Vec<Suspect> {
 pub fn explain(case: &Case, mut go_on: impl FnMut(Cause) -> bool) -> Option<(Bill, Vec<Finding>)> {
     let usual = Bill::of(case);
     let mut findings = Vec::new();
-    for Suspect { cause, evidence, remedy, without } in suspects(case) {
-        if !go_on(cause) {
+    for suspect in suspects(case) {
+        if !go_on(suspect.cause) {
             return None;
         }
-        let without = Bill::of(&without);
-        let saving = 1.0 - without.sum().cost() as f64 / usual.sum().cost().max(1) as f64;
-        findings.push(Finding { cause, evidence, remedy, without, saving });
+        findings.push(Finding::of(&usual, Bill::of(&suspect.without), suspect));
     }
     findings.sort_by(|a, b| b.saving.total_cmp(&a.saving));
     Some((usual, findings))

@@ -4,8 +4,8 @@ use std::iter;
 
 use super::table::Table;
 use super::{Model, Report};
+use crate::accel::AccelKind;
 use crate::accel::auto::nodes;
-use crate::accel::{AccelKind, RayCounts};
 use crate::bench::row::Row;
 use crate::number::grouped;
 
@@ -23,6 +23,8 @@ pub struct Outcome {
     pub nodes: f64,
     /// What makes the times doubtful, to be added to a sentence.
     doubt: &'static str,
+    /// Whether both are the same tree, whatever the clock says.
+    one_tree: bool,
 }
 
 impl Outcome {
@@ -44,20 +46,29 @@ impl Outcome {
             chosen,
             other,
             time: report.is_timed().then(|| share(&|row| model.seconds_per_ray(row))),
-            nodes: share(&counted),
+            nodes: share(&|row| counted(model, row)),
             doubt: report.doubt(model, ours, theirs),
+            one_tree: is_one_tree(ours, theirs),
         })
     }
 
-    /// Whether the choice was the better one, by time where there is one.
-    pub fn is_right(&self) -> bool {
-        is_no_loss(self.time.unwrap_or(self.nodes))
+    /// Whether the choice was the better one, by time where there is one; `None` where that cannot be told apart.
+    pub fn is_right(&self) -> Option<bool> {
+        let certain = self.one_tree || self.time.is_none() || self.doubt.is_empty();
+        certain.then(|| self.one_tree || is_no_loss(self.time.unwrap_or(self.nodes)))
     }
 
     /// Whether the choice was the better one, and by how much.
     pub fn sentence(&self) -> String {
         let Self { other, nodes, doubt, .. } = self;
-        let right = if self.is_right() { "right" } else { "wrong" };
+        if self.one_tree {
+            return format!("On these rays that makes no difference: {other} is the same tree");
+        }
+        let right = match self.is_right() {
+            Some(true) => "right",
+            Some(false) => "wrong",
+            None => "neither right nor wrong for certain",
+        };
         let counted = format!("counted as auto does, {other} costs {}", more(*nodes));
         match self.time {
             Some(time) => {
@@ -80,10 +91,14 @@ fn more(share: f64) -> String {
 }
 
 /// What `auto` counts, for an average ray of the picture.
-fn counted(row: &Row) -> f64 {
-    let mut sum = RayCounts::default();
-    row.classes.iter().for_each(|class| sum += class.counts);
-    nodes(&sum)
+fn counted(model: &Model, row: &Row) -> f64 {
+    model.mean(row, |class| nodes(&class.counts))
+}
+
+/// Whether two structures have the same tree, by everything that is counted of it and in it.
+fn is_one_tree(a: &Row, b: &Row) -> bool {
+    let alike = a.classes.iter().zip(&b.classes).all(|(a, b)| a.counts == b.counts);
+    a.made_of == b.made_of && a.rays() == b.rays() && alike
 }
 
 /// What `auto` would choose, why, and how that fared; empty where it was not asked.

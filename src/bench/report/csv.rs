@@ -29,14 +29,13 @@ pub fn write(report: &Report) -> String {
 
 fn line(report: &Report, model: &Model, row: &Row, rays: &Rays, class: &ClassRow) -> String {
     let (s, m, p) = (row.made_of, &report.machine, &report.plan);
-    let rate = class.rate();
     let mut cells = vec![quoted(&model.name), model.prims.to_string(), row.kind.to_string(), rays.class.name().into()];
     cells.extend([class.counts.queries, rays.asked].map(|n| n.to_string()));
     cells.extend([row.sampled.to_string(), class.differing.to_string()]);
     cells.extend([row.build.median(), row.build.min(), row.build.max()].map(number));
     cells.extend([s.bytes, s.n_in, s.n_v, s.n_ev, s.n_oiv].map(|n| n.to_string()));
     cells.push(model.break_even(row).map_or(String::new(), number));
-    cells.extend([rate.median(), rate.min(), rate.max()].map(number));
+    cells.extend(class.rates().map(number));
     cells.extend(Count::ALL.map(|c| number(class.per_ray(c))));
     cells.extend([class.n_min(), class.culled(model.prims)].map(number));
     cells.extend([p.threads.to_string(), p.passes.to_string(), p.seed.to_string()]);

@@ -17,7 +17,7 @@ use super::compare::{Plan, break_even};
 use super::machine::Machine;
 use super::pruning::Pruning;
 use super::rays::{Class, RaySet};
-use super::row::Row;
+use super::row::{ClassRow, Row};
 use crate::accel::auto::Reason;
 use crate::accel::{AccelKind, Count};
 use crate::generate::Family;
@@ -100,7 +100,7 @@ impl Rays {
 }
 
 impl Model {
-    /// Seconds for a ray of the recorded mixture.
+    /// Seconds for a ray of the picture's mixture, of whose classes a part may be kept.
     pub fn seconds_per_ray(&self, row: &Row) -> f64 {
         row.seconds_per_ray(&self.mixture(), Spread::median)
     }
@@ -111,14 +111,19 @@ impl Model {
         [Spread::min, Spread::max].map(|pick| row.seconds_per_ray(&mixture, pick))
     }
 
-    fn mixture(&self) -> Vec<usize> {
-        self.rays.iter().map(|r| r.kept).collect()
+    fn mixture(&self) -> Vec<u64> {
+        self.rays.iter().map(|r| r.asked).collect()
     }
 
-    /// A count for a ray of the recorded mixture.
+    /// A count for a ray of the picture's mixture.
     pub fn per_ray(&self, row: &Row, count: Count) -> f64 {
-        let all: usize = self.rays.iter().map(|r| r.kept).sum();
-        let sum: f64 = row.classes.iter().zip(&self.rays).map(|(c, r)| c.per_ray(count) * r.kept as f64).sum();
+        self.mean(row, |class| class.per_ray(count))
+    }
+
+    /// What is known of each class, for a ray of the picture's mixture.
+    fn mean(&self, row: &Row, of: impl Fn(&ClassRow) -> f64) -> f64 {
+        let all: u64 = self.rays.iter().map(|r| r.asked).sum();
+        let sum: f64 = row.classes.iter().zip(&self.rays).map(|(class, r)| of(class) * r.asked as f64).sum();
         sum / all as f64
     }
 
@@ -140,11 +145,16 @@ impl Model {
         fast.or(self.rows.first()).map(|r| r.kind)
     }
 
+    /// Rays that more than one structure got, which are the ones whose hits were compared.
+    pub fn compared(&self) -> u64 {
+        let mut rays: Vec<u64> = self.rows.iter().map(Row::rays).collect();
+        rays.sort_unstable();
+        rays.iter().rev().nth(1).copied().unwrap_or(0)
+    }
+
     /// Whether all structures agree, in a sentence.
     pub fn verdict(&self) -> String {
-        let rays: usize = self.rays.iter().map(|r| r.kept).sum();
-        let (count, differing) = (self.rows.len(), self.differing());
-        let rays = grouped(rays as u64);
+        let (count, differing, compared) = (self.rows.len(), self.differing(), self.compared());
         let reference = self.reference().map_or("", AccelKind::name);
         if differing > 0 {
             let wrong = self.rows.iter().filter(|r| r.differing() > 0);
@@ -152,11 +162,15 @@ impl Model {
                 wrong.map(|r| format!("{} in {} rays", r.name(), grouped(r.differing()))).collect();
             return format!("hits DIFFER from those of {reference}: {}", wrong.join(", "));
         }
-        let sampled: Vec<&str> = self.rows.iter().filter(|r| r.sampled).map(|r| r.kind.name()).collect();
-        let but = if sampled.is_empty() { String::new() } else { format!(" (a sample for {})", sampled.join(", ")) };
-        match count {
-            1 => format!("one structure only, {rays} rays: nothing to compare its hits with"),
-            _ => format!("hits identical, bit for bit, in all {count} structures: {rays} rays{but}"),
+        let fewer = self.rows.iter().filter(|r| r.rays() < compared);
+        let fewer: Vec<&str> = fewer.map(|r| r.kind.name()).collect();
+        let but = if fewer.is_empty() { String::new() } else { format!(" (a sample for {})", fewer.join(", ")) };
+        match &self.rows[..] {
+            [only] => format!("one structure only, {} rays: nothing to compare its hits with", grouped(only.rays())),
+            _ => {
+                let rays = grouped(compared);
+                format!("hits identical, bit for bit, in all {count} structures: {rays} rays{but}")
+            }
         }
     }
 
@@ -210,9 +224,10 @@ impl Report {
             1 => format!("times: wall clock of {on}, one pass only, so of unknown spread"),
             n => format!("times: wall clock of {on}, median and range of {n} interleaved passes"),
         };
-        let tests = grouped(*slow_tests);
+        let (tests, fewest) = (grouped(*slow_tests), Plan::FEWEST);
         format!(
-            "{times}; counts from separate passes; slow structures get a sample of at most {tests} tests a class; seed {seed}"
+            "{times}; counts from separate passes; slow structures get a sample of at most {tests} tests a class, but of \
+             {fewest} rays at least; seed {seed}"
         )
     }
 }

@@ -58,8 +58,8 @@ pub(super) fn class(report: &Report, model: &Model, i: usize, rays: &Rays) -> Ta
 fn costs(report: &Report, model: &Model, row: &Row, class: &ClassRow) -> Vec<String> {
     let mut cells = vec![name(row)];
     if report.is_timed() {
-        let rate = class.rate();
-        cells.extend([short(rate.median()), format!("{}..{}", short(rate.min()), short(rate.max()))]);
+        let [median, min, max] = class.rates().map(short);
+        cells.extend([median, format!("{min}..{max}")]);
     }
     cells.extend(Count::ALL.map(|count| short(class.per_ray(count))));
     cells.push(culled(class, model.prims));

@@ -121,7 +121,7 @@ pub struct Setting {
     pub test: IntersectorKind,
 }
 
-/// Every setting of every knob that the scene has. What a knob does not turn is as at the usual quality.
+/// Every setting of every knob that the scene has. What a knob does not turn is as `render` has it.
 pub(super) fn settings(subject: &Subject) -> Vec<Setting> {
     let features = Features::of(subject.scene);
     Knob::ALL
@@ -132,8 +132,15 @@ pub(super) fn settings(subject: &Subject) -> Vec<Setting> {
 }
 
 fn of(knob: Knob, subject: &Subject) -> Vec<Setting> {
-    let stochastic = |how: Stochastic| Sampling::Stochastic(Stochastic { space: subject.space(), ..how });
-    let usual = Settings { sampling: stochastic(Quality::default().stochastic()), ..subject.base.clone() };
+    let stochastic = |how: Stochastic| {
+        let min_samples = how.min_samples.max(subject.fewest).min(how.max_samples);
+        Sampling::Stochastic(Stochastic { min_samples, space: subject.space(), ..how })
+    };
+    // What is rendered where a flag says nothing of samples.
+    let usual = match subject.samples {
+        Some(samples) => Settings { sampling: Sampling::Uniform, samples, ..subject.base.clone() },
+        None => Settings { sampling: stochastic(Quality::default().stochastic()), ..subject.base.clone() },
+    };
     let sampled = |sampling: Sampling, samples: u32| Settings { sampling, samples, ..usual.clone() };
     let setting = |flags: String, settings: Settings| Setting { knob, flags, settings, test: IntersectorKind::Exact };
     match knob {

@@ -37,6 +37,10 @@ pub struct Subject<'a> {
     pub view: &'a View,
     /// What is not studied: size and whatever the scene asks for.
     pub base: &'a Settings,
+    /// Samples of every pixel that the scene asks for; `None`: stochastic sampling, of the usual quality.
+    pub samples: Option<u32>,
+    /// The fewest samples of a pixel that stochastic sampling takes of it.
+    pub fewest: u32,
     /// How linear light becomes the picture whose error counts.
     pub output: &'a Output,
 }

@@ -68,8 +68,17 @@ fn study_of(scene: &Scene, reference_samples: u32, knobs: &[Knob]) -> Study {
     let (textures, view) = (TextureStore::new(scene), View::from_camera(&camera));
     let base = Settings { width: 48, height: 32, ..Settings::default() };
     let output = Output::default();
-    let subject =
-        Subject { scene, world: &world, accel: &accel, textures: &textures, view: &view, base: &base, output: &output };
+    let subject = Subject {
+        scene,
+        world: &world,
+        accel: &accel,
+        textures: &textures,
+        view: &view,
+        base: &base,
+        samples: scene.hints.samples,
+        fewest: 1,
+        output: &output,
+    };
     let plan = Plan { passes: 2, reference_samples, seed: 7 };
     let reference = reference(&subject, &plan, &mut |_, _| true).unwrap();
     let rows: Vec<Row> = settings(&subject)

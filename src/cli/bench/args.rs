@@ -65,8 +65,8 @@ pub(in crate::cli) struct BenchArgs {
     /// From where it is seen.
     #[command(flatten)]
     pub eye: EyeArgs,
-    /// Rays of each class at most; of more an even sample is taken
-    #[arg(long, value_name = "N", default_value_t = Plan::RAYS, value_parser = parse::positive, help_heading = "Rays")]
+    /// Rays of each class at most, up to 524288; of more an even sample is taken
+    #[arg(long, value_name = "N", default_value_t = Plan::RAYS, value_parser = parse::rays, help_heading = "Rays")]
     pub rays: usize,
     /// Other numbers give other diffuse rays and samples
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Rays")]
@@ -81,7 +81,7 @@ pub(in crate::cli) struct BenchArgs {
     /// What the kernels may use.
     #[command(flatten)]
     pub simd: SimdArgs,
-    /// Ray/prim tests of each class that a slow structure may take in a pass; it gets as few rays as that allows
+    /// Ray/prim tests of each class that a slow structure may take in a pass; it gets as few rays as that allows, but 16
     #[arg(long, value_name = "N", default_value_t = Plan::SLOW_TESTS, help_heading = "Run")]
     pub slow_tests: u64,
     /// Write a report too, after each structure; what kind the ending says: json, csv, md, html

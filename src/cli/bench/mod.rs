@@ -7,7 +7,7 @@ mod spd;
 
 use super::exit::Exit;
 use super::job::{self, Wrong};
-use super::message::Messages;
+use super::message::{Messages, Severity};
 use super::writable::{self, Sources};
 use super::{accident, interrupt};
 use crate::accel::{AccelKind, AccelParams};
@@ -78,9 +78,17 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
         }
     }
     if report.models.is_empty() {
+        if worst == Exit::Done {
+            bench.messages.error(
+                "nothing-measured",
+                "every size was left out",
+                "raise --slow-tests, or name a structure that is not slow",
+            );
+            return Exit::Failed;
+        }
         return worst;
     }
-    report.complete = worst == Exit::Done;
+    report.complete = true;
     if report.family.is_some() {
         worst = worst.max(bench.print(&format!("{}\n", text::write_growth(&report))));
     }
@@ -196,7 +204,8 @@ impl Bench<'_> {
         self.spares(&prepared.loaded).map_err(|fault| self.messages.fail(&fault, Exit::Failed))?;
         let name = subject.to_string();
         let (plan, mut left_out) = self.bearable(report, &prepared).map_err(|why| {
-            self.messages.info("size-left-out", format!("{name} is left out: {why}"));
+            let text = format!("left out: {why}");
+            self.messages.say(Severity::Warning, &Diagnostic::new("size-left-out", &name, "", text));
             Exit::Done
         })?;
         let plan = self.able(plan, &prepared, &name, &mut left_out)?;
