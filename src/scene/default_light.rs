@@ -40,8 +40,7 @@ pub fn add_if_missing(scene: &mut Scene, camera: &Camera) -> DefaultLight {
     if scene.hints.default_light == Some(false) {
         return DefaultLight::NotWanted;
     }
-    let own_environment = !matches!(scene.environment, Environment::Black | Environment::Studio);
-    if !scene.lights.is_empty() || scene.ambient != Vec3::ZERO || own_environment {
+    if !is_missing(scene) {
         return DefaultLight::NotMissing;
     }
     let features = Features::of(scene);
@@ -52,6 +51,12 @@ pub fn add_if_missing(scene: &mut Scene, camera: &Camera) -> DefaultLight {
     scene.lights = vec![lamp("key", KEY, KEY_FROM, true, camera), lamp("fill", FILL, FILL_FROM, false, camera)];
     scene.environment = Environment::Studio;
     DefaultLight::Added
+}
+
+/// Whether a scene has no light: no lamp, no ambient term and no environment of its own.
+pub fn is_missing(scene: &Scene) -> bool {
+    let own_environment = !matches!(scene.environment, Environment::Black | Environment::Studio);
+    scene.lights.is_empty() && scene.ambient == Vec3::ZERO && !own_environment
 }
 
 /// A directional light that comes from `from` in camera space.

@@ -12,7 +12,7 @@ pub(in crate::cli) struct GenerateArgs {
     /// Which kind of scene
     #[arg(value_name = "NAME", value_parser = parse::named::<Family>())]
     pub family: Family,
-    /// About how many triangles, up to 1e7; families that grow in steps take the step above
+    /// About how many triangles, up to 1e7; families that grow in steps take the nearest one
     #[arg(long, value_name = "N", default_value = "1e5", value_parser = parse::triangles)]
     pub size: usize,
     /// Where to write: a .glb (with materials and instances) or an .obj (triangles alone) [default: NAME-N.glb]

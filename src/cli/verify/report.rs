@@ -146,9 +146,15 @@ impl Report<'_> {
     }
 
     fn verdict(&self) -> String {
+        if self.findings.total(IntersectorKind::Exact).hits == 0 {
+            return "Nothing is known of this mesh: none of its triangles can be hit, by exact arithmetic.".into();
+        }
         let choice = self.choice();
         let total = self.findings.total(choice);
-        let other = IntersectorKind::MollerTrumbore;
+        let other = match choice {
+            IntersectorKind::MollerTrumbore => IntersectorKind::Exact,
+            _ => IntersectorKind::MollerTrumbore,
+        };
         let compared = self.findings.total(other);
         let apart = self.findings.sections.iter().filter(|section| !section.centred);
         let started: usize = apart.map(|section| section.spawned.self_hits + section.spawned.slips).sum();
