@@ -7,6 +7,11 @@ pub fn grouped(n: u64) -> String {
     groups.join(" ")
 }
 
+/// The hash of what was read, as it is written everywhere: 32 hexadecimal digits.
+pub fn hash(hash: u128) -> String {
+    format!("{hash:032x}")
+}
+
 /// So many of what is called `one`: `1 ray`, `4 rays`.
 pub fn so_many(n: u64, one: &str) -> String {
     format!("{} {one}{}", grouped(n), if n == 1 { "" } else { "s" })

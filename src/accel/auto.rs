@@ -31,10 +31,11 @@ use crate::math::triangle;
 use crate::named::{Named, UnknownName};
 use rayon::prelude::*;
 
-/// Of so many prims one is judged, and no more than these: finding out must cost less than it can save. Where that were
-/// fewer than so many, the octree is taken.
+/// One prim of so many is judged: finding out must cost less than it can save.
 const SHARE: u32 = 32;
+/// Where that were fewer than these, the octree is taken.
 const FEWEST: u32 = 1 << 10;
+/// No more than these are judged.
 const MOST: u32 = 1 << 13;
 
 /// They are taken in runs of so many neighbours: longer ones leave out more of the scene.
@@ -161,7 +162,7 @@ impl fmt::Display for Reason {
         }
         write!(
             f,
-            "{kind}: {rays} rays through {prims} shapes cost {octree:.1} nodes each with fast-octree, {bvh:.1} with \
+            "{kind}: {rays} rays through a sample of {prims} shapes cost {octree:.1} nodes each with fast-octree, {bvh:.1} with \
              fast-bvh, which must save {:.1} %, more than chance in such a sample",
             WORTH * 100.0
         )

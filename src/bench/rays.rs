@@ -135,7 +135,6 @@ fn set(class: Class, tape: &Tape, seed: u64) -> RaySet {
     let (kept, of) = parts.into_iter().filter(|part| part.1 > 0).fold((1, 1), |least, part| {
         if u128::from(part.0) * u128::from(least.1) < u128::from(least.0) * u128::from(part.1) { part } else { least }
     });
-    #[expect(clippy::cast_possible_truncation, reason = "no more than are kept")]
     let share = |total: u64| (u128::from(total) * u128::from(kept) / u128::from(of)) as usize;
     let batch = |question| {
         let all = Batch::new(question, tape.rays(question));
@@ -177,6 +176,7 @@ fn bounce(world: &World, ray: &Ray, hit: &Hit, random: &mut Random) -> Option<Ra
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::observer::Observer;
 
     #[test]
     fn a_sample_is_as_large_as_it_may_be_and_no_larger() {
@@ -191,6 +191,21 @@ mod tests {
             assert_eq!(sample.len(), limit.min(743));
             assert!(places.iter().zip(&sample.batches).all(|(places, batch)| places.len() == batch.rays.len()));
         }
+    }
+
+    #[test]
+    fn of_every_question_of_a_class_the_same_part_is_kept() {
+        let mut tape = Tape::default();
+        let rays = vec![Ray::new(Vec3::ZERO, Vec3::X); 1 << 12];
+        let times = 3 * Tape::LIMIT / rays.len();
+        (0..times).for_each(|_| tape.asked(Question::Occluded, &rays, &[]));
+        (0..32).for_each(|_| tape.asked(Question::Closest, &rays, &[]));
+        let set = set(Class::Shadow, &tape, 5);
+        let total = (3 * Tape::LIMIT + 32 * rays.len()) as u64;
+        assert_eq!((set.asked, set.batches.len()), (total, 2));
+        let [closest, occluded] = [0, 1].map(|i| set.batches[i].rays.len() as f64);
+        let part = occluded / (3 * Tape::LIMIT) as f64;
+        assert!((0.16..0.34).contains(&part) && (closest / (32 << 12) as f64 / part - 1.0).abs() < 1e-3, "{part}");
     }
 
     #[test]

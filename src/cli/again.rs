@@ -19,6 +19,7 @@ use crate::accel::{AccelKind, Assign, MailboxKind};
 use crate::image::{ExrSamples, FileKind, ImageError, Metadata, PngDepth, read_metadata};
 use crate::load::{Diagnostic, Loaded, MtlMode, Polygons};
 use crate::math::DVec3;
+use crate::number::hash;
 use crate::render::Sampled;
 use crate::scene::{Background, Environment, UpAxis};
 use clap::Parser;
@@ -124,7 +125,7 @@ impl Making<'_> {
 
     /// Hash of everything read.
     pub(super) fn hash(&self) -> String {
-        format!("{:032x}", self.loaded.facts.hash)
+        hash(self.loaded.facts.hash)
     }
 
     /// The flags that render the same picture again.
@@ -423,7 +424,7 @@ fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> R
 /// Refuses inputs that are not those of the picture. One hash stands for all files that were read, so it cannot be said
 /// which of them has changed.
 pub(super) fn check_hash(expected: &str, loaded: &Loaded, inputs: &[PathBuf], look: &Look) -> Result<(), Diagnostic> {
-    let found = format!("{:032x}", loaded.facts.hash);
+    let found = hash(loaded.facts.hash);
     if found == expected {
         return Ok(());
     }

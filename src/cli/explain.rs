@@ -15,7 +15,7 @@ use super::seen::{self, Seen};
 use super::{accident, interrupt};
 use crate::accel::{AccelParams, auto};
 use crate::bench::explain::{Bill, Case, Finding, WORTH, Work, explain};
-use crate::number::{grouped, short};
+use crate::number::{grouped, hash, short};
 use crate::render::{CLASS_NAMES, Settings};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -130,7 +130,7 @@ impl Told<'_> {
             "schema": "meshray-explain/1",
             "version": super::version::SHORT,
             "file": self.name,
-            "hash": format!("{:032x}", self.hash),
+            "hash": hash(self.hash),
             "view": self.view,
             "width": self.case.settings.width,
             "height": self.case.settings.height,

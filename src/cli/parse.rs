@@ -385,6 +385,16 @@ mod tests {
     }
 
     #[test]
+    fn numbers_of_things_are_whole_and_may_be_powers() {
+        assert_eq!([positive("7"), positive("1e3"), positive("2.5e4")], [Ok(7), Ok(1000), Ok(25_000)]);
+        for wrong in ["0", "-1", "1.5", "1e-3", "1e16", "1e300", "nan", "inf", ""] {
+            assert!(positive(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(rays("524288"), Ok(524_288));
+        assert!(rays("524289").unwrap_err().ends_with("524288"));
+    }
+
+    #[test]
     fn vectors_have_three_finite_parts() {
         assert_eq!(vec3("-1, 2.5,3e2"), Ok([-1.0, 2.5, 300.0]));
         for wrong in ["1,2", "1,2,3,4", "1,2,nan", "inf,0,0", ""] {

@@ -79,7 +79,7 @@ impl Effective {
         f64::from(self.settings.width) / f64::from(self.settings.height)
     }
 
-    /// The same; whether what the scene does without is done all the same.
+    /// With or without the work that the scene does not need.
     pub(super) fn with_everything(mut self, everything: bool) -> Self {
         self.settings.everything = everything;
         self

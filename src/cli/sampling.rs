@@ -363,7 +363,7 @@ pub(super) fn plain(x: f32) -> f64 {
     x.to_string().parse().unwrap_or_else(|_| x.into())
 }
 
-/// The same for programs.
+/// How pixels were sampled, for programs: as [`phrase`] tells it.
 pub(super) fn json(settings: &Settings, sampled: &Sampled) -> Value {
     let rays = json!({ "rays": sampled.rays, "mean": sampled.mean(), "most": sampled.most() });
     let mut all = match settings.sampling {

@@ -4,7 +4,8 @@ use super::develop::{Raster, raster};
 use super::{FileKind, ImageError, Metadata, Output, Picture, exif, srgb};
 use ::image::codecs::jpeg::JpegEncoder;
 use ::image::codecs::webp::WebPEncoder;
-use ::image::{ExtendedColorType, ImageEncoder, ImageFormat, ImageReader};
+use ::image::metadata::Orientation;
+use ::image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageFormat, ImageReader};
 use std::io::Cursor;
 
 /// Room for EXIF in a JPEG's APP1 segment: 65 535 bytes less the length field and the six letters before it.
@@ -33,7 +34,7 @@ pub(super) fn encode_webp(picture: &Picture, output: &Output, metadata: &Metadat
     Ok(file)
 }
 
-/// Reads such a file; at most `max_pixels`.
+/// Reads such a file as it is looked at; at most `max_pixels`.
 pub(super) fn decode(bytes: &[u8], kind: FileKind, max_pixels: u64) -> Result<Picture, ImageError> {
     let fail = |e: ::image::ImageError| ImageError::decode(kind, e);
     let format = if kind == FileKind::Webp { ImageFormat::WebP } else { ImageFormat::Jpeg };
@@ -47,7 +48,12 @@ pub(super) fn decode(bytes: &[u8], kind: FileKind, max_pixels: u64) -> Result<Pi
     };
     let (width, height) = reader().into_dimensions().map_err(fail)?;
     super::read::check_size(kind, width, height, max_pixels)?;
-    let pixels = reader().decode().map_err(fail)?.into_rgba8();
+    let mut decoder = reader().into_decoder().map_err(fail)?;
+    // Cameras note how they were held.
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let mut upright = DynamicImage::from_decoder(decoder).map_err(fail)?;
+    upright.apply_orientation(orientation);
+    let pixels = upright.into_rgba8();
     let premultiplied = |[r, g, b, a]: [u8; 4]| {
         let part = f32::from(a) / 255.0;
         let [r, g, b] = [r, g, b].map(|c| srgb::decode8(c) * part);
@@ -106,6 +112,19 @@ mod tests {
             near(3, [188, 0, 0]);
             near(60, right);
         }
+    }
+
+    #[test]
+    fn a_photo_is_turned_as_its_camera_says() {
+        // Little-endian TIFF with one entry: orientation (0x112), a short, upside down.
+        let exif = [b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".as_slice(), &[3, 0, 0, 0, 0, 0, 0, 0]].concat();
+        let mut bytes = Vec::new();
+        let mut encoder = JpegEncoder::new_with_quality(&mut bytes, 100);
+        encoder.set_exif_metadata(exif).unwrap();
+        let rows = [[250_u8; 16 * 8 * 3], [5; 16 * 8 * 3]].concat();
+        encoder.write_image(&rows, 16, 16, ExtendedColorType::Rgb8).unwrap();
+        let picture = decode(&bytes, FileKind::Jpeg, 256).unwrap();
+        assert!(picture.beauty[0][0] < 0.1 && picture.beauty[255][0] > 0.9);
     }
 
     #[test]

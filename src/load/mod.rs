@@ -6,6 +6,7 @@
 pub(crate) mod choice;
 mod detect;
 pub mod diagnostic;
+mod finder;
 mod geometry;
 pub mod gltf;
 mod jpeg;

@@ -32,7 +32,7 @@ mod glint;
 mod immersion;
 mod keeping;
 mod layers;
-mod observer;
+pub(crate) mod observer;
 pub mod optics;
 mod part;
 mod patch;

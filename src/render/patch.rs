@@ -285,7 +285,7 @@ impl Patch<'_> {
         Some((tangent, sign))
     }
 
-    /// The same along the coordinates of a map as its transform turns them: what its texels are given in.
+    /// As [`Self::tangents`] has them, along the coordinates of a map as its transform turns them: what its texels are given in.
     fn tangents_of_map(&self, normal: Vec3, map: &TextureRef) -> Option<(Vec3, Vec3)> {
         let made_along = self.mesh.tangents_along;
         let made_for_it = made_along.is_none_or(|along| along.set == map.uv_set);

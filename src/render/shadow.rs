@@ -1,4 +1,4 @@
-//! Shadow rays: one for each light that a point could see, traced in waves.
+//! Shadow rays, to lights and to the surroundings, traced in waves.
 
 use super::asking::Asking;
 use super::context::Context;

@@ -69,15 +69,15 @@ pub(super) struct PixelFacts {
     pub end: End,
 }
 
-/// Why a pixel got no more samples.
+/// Whether a pixel needs more samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum End {
     /// Nothing was estimated.
     Unknown,
     /// Its mean was certain.
     Met,
-    /// It had the most that are allowed.
-    Ceiling,
+    /// Its mean is not certain: it goes on, or had the most that are allowed.
+    Open,
 }
 
 /// One way to sample a tile, whichever was chosen; `None` when cancelled.
@@ -200,7 +200,7 @@ impl Sampled {
         for (count, facts) in self.counts[to.clone()].iter_mut().zip(facts) {
             *count = facts.count;
             met += u64::from(facts.end == End::Met);
-            at_most += u64::from(facts.end == End::Ceiling);
+            at_most += u64::from(facts.end == End::Open);
             spare += u64::from(facts.spare);
         }
         if let Some(errors) = self.errors.get_mut(to) {

@@ -159,8 +159,8 @@ impl Media {
 pub(crate) struct Queue {
     rays: Vec<Ray>,
     paths: Vec<Path>,
-    /// The hit after which the search goes on; of a ray that starts the hit that it comes from, its `t` as far as it may meet
-    /// what is the same crossing, or [`Hit::MISS`].
+    /// Of a ray that goes on: the hit behind which it does. Of a ray that starts: the hit it left, with `t` as far as it may
+    /// meet the same surface again; [`Hit::MISS`] if it may not.
     after: Vec<Hit>,
     /// So many at the front are in the order of their samples.
     in_order: usize,

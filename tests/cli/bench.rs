@@ -43,7 +43,24 @@ fn a_size_that_is_no_new_scene_and_a_structure_that_is_too_slow_are_left_out_and
     let words = ["bench", "--size", "8x6", "--passes", "0", "--accel", "none,bvh", "--generate", "tetra", "--sizes"];
     let run = folder.run(&[&words[..], &["60,64,1000", "--slow-tests", "2000"]].concat()).ends(0);
     assert!(run.text().contains("none is left out from 1 024 prims on"), "{}", run.text());
-    run.says(&["tetra-64 is left out: the nearest scene of its family is tetra-60"]);
+    run.says(&["tetra-64: left out: the nearest scene of its family is tetra-60"]);
+}
+
+#[test]
+fn where_every_size_is_too_large_nothing_is_measured_and_that_is_no_success() {
+    let folder = Folder::new();
+    let words = ["none", "--generate", "tetra", "--sizes", "1000,4000", "--slow-tests", "2000", "--report", "r.json"];
+    let run = folder.run(&[&QUICK[..], &words].concat()).ends(1);
+    run.says(&["1024 prims are too many", "every size was left out", "--slow-tests"]);
+    assert!(folder.names().is_empty(), "{:?}", folder.names());
+}
+
+#[test]
+fn a_model_that_is_missing_does_not_make_the_report_of_the_others_incomplete() {
+    let folder = Folder::with_cube();
+    folder.run(&[&QUICK[..], &["bvh", "cube.obj", "none.obj", "--report", "r.json"]].concat()).ends(1);
+    let report: Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
+    assert_eq!((&report["complete"], report["models"].as_array().unwrap().len()), (&true.into(), 1));
 }
 
 #[test]

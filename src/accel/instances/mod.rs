@@ -175,9 +175,9 @@ impl Kept {
         }
     }
 
-    /// What was not opaque for a while is again, or the other way round: all objects at once.
-    pub fn set_opaque(&mut self, opaque: bool) {
-        self.objects.iter_mut().for_each(|o| o.opaque = opaque);
+    /// From now on nothing that is kept stops light by itself: who asks is asked what it lets through.
+    pub fn open_all(&mut self) {
+        self.objects.iter_mut().for_each(|object| object.opaque = false);
     }
 }
 

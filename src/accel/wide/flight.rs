@@ -169,7 +169,7 @@ impl<W: Wave, B: BoxMargins> Kernel for InFlight<'_, W, B> {
 }
 
 impl Slot {
-    /// The same, eight at a time.
+    /// As [`Self::pop`] does, eight entries at a time.
     #[inline(always)]
     fn pop_many<S: Simd>(&mut self, s: S) -> u32 {
         let mut top = self.top;

@@ -10,7 +10,7 @@
 //! In both, the binary cuts are improved and fused into nodes of eight (`build`). Each prim is listed once, so there is no
 //! mailbox: there would be nothing for it to save.
 //!
-//! Rays go one by one (`alone`), many in flight (`flight`) or sixteen side by side (`packet`; those from one place enter by
+//! Rays go one by one (`alone`), many in flight (`flight`) or sixteen and more side by side (`packet`; those from one place enter by
 //! crowds, `entrance`, and share what they see of blocks, `shelf`), through triangles; where there is anything else, or
 //! somebody counts, they go one by one through whatever there is (`walk`). Hits are ordered by (t, prim) and every test
 //! gives an exact verdict, so that neither the order of visits nor the company of other rays can change an answer.

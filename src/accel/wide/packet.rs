@@ -515,7 +515,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         if hit == 0 {
             return trip.wave.take_all(start, &[Hit::MISS; N]);
         }
-        let (mut unsure, zero) = (hit, wide.splat(0.0));
+        let zero = wide.splat(0.0);
         let place = found.place[hit.trailing_zeros() as usize % N];
         let Meetings { t, weights: [u, v], sure } = if hit & !wide.find_word(place, &found.place) == 0 {
             let bounds = self.rays.row_bounds();
@@ -523,10 +523,10 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         } else {
             self.meet_each(wide, tree, hit)
         };
-        let t = wide.choose(unsure, t, wide.splat(f32::INFINITY));
+        let t = wide.choose(hit, t, wide.splat(f32::INFINITY));
         let (mut t, mut u, mut v) =
-            (wide.store(t), wide.store(wide.choose(unsure, u, zero)), wide.store(wide.choose(unsure, v, zero)));
-        unsure &= !sure;
+            (wide.store(t), wide.store(wide.choose(hit, u, zero)), wide.store(wide.choose(hit, v, zero)));
+        let mut unsure = hit & !sure;
         while unsure != 0 {
             let ray = unsure.trailing_zeros() as usize % N;
             unsure &= unsure - 1;

@@ -243,3 +243,30 @@ fn a_plain_mesh_has_nothing_to_explain() {
     assert!(usual.sum().tests > 0 && findings.iter().all(|f| f.saving < 0.1), "{findings:?}");
     assert_eq!(explain(&case(Family::Stadium.scene(500), AccelKind::Grid), |_| false), None, "it can be ended");
 }
+
+#[test]
+fn what_transforms_points_for_each_prim_costs_them_and_another_structure_saves_them() {
+    let case = case(scene(vec![(ball(Vec3::ZERO, 1.0, 20), matt())]), AccelKind::Transform);
+    let (usual, findings) = explain(&case, |_| true).expect("it goes on");
+    assert!(usual.sum().transforms > 100 * usual.sum().rays && usual.sum().cost() > usual.sum().transforms);
+    assert!(findings[0].cause == Cause::Structure && findings[0].saving > 0.9, "{findings:?}");
+}
+
+#[test]
+fn a_saving_is_of_as_many_rays_and_small_ones_of_rays_that_were_drawn_anew_are_chance() {
+    let work = |rays: u64, tests: u64| Work { rays, tests, ..Work::default() };
+    let usual = Bill([work(100, 1000), work(50, 500), Work::default(), Work::default()]);
+    let found = |shadow: Work, cause: Cause| {
+        let case = case(scene(vec![(ball(Vec3::ZERO, 1.0, 4), matt())]), AccelKind::Grid);
+        let suspect = Suspect { cause, evidence: String::new(), remedy: String::new(), without: case };
+        Finding::of(&usual, Bill([work(100, 1000), shadow, Work::default(), Work::default()]), suspect)
+    };
+    let alike = found(work(100, 1000), Cause::Shells);
+    assert!(alike.saving.abs() < 1e-12 && alike.is_drawn_anew && !alike.is_worth_it());
+    let cheaper = found(work(100, 880), Cause::Shells);
+    assert!((cheaper.saving - 0.04).abs() < 1e-12 && !cheaper.is_worth_it(), "chance");
+    let same_rays = found(work(50, 440), Cause::Shells);
+    assert!((same_rays.saving - 0.04).abs() < 1e-12 && !same_rays.is_drawn_anew && same_rays.is_worth_it());
+    let fewer = found(work(25, 250), Cause::Lights);
+    assert!((fewer.saving - 1.0 / 6.0).abs() < 1e-12 && !fewer.is_drawn_anew && fewer.is_worth_it());
+}

@@ -41,6 +41,7 @@ use crate::accel::{AccelKind, Count};
 use crate::bench::clock::Spread;
 use crate::bench::rays::Class;
 use crate::bench::row::{ClassRow, Row};
+use crate::number::hash;
 use crate::render::View;
 use crate::render::view::Lens;
 use serde_json::{Map, Value, json};
@@ -73,7 +74,7 @@ pub fn write(report: &Report) -> String {
 fn model(report: &Report, model: &Model) -> Value {
     let rays = model.rays.iter().map(|r| (r.class.name().to_owned(), json!({ "asked": r.asked, "kept": r.kept })));
     json!({
-        "file": model.name, "hash": format!("{:032x}", model.hash), "prims": model.prims,
+        "file": model.name, "hash": hash(model.hash), "prims": model.prims,
         "objects": model.objects, "kept_instances": model.kept, "auto": choice(report, model),
         "picture": {
             "width": model.width, "height": model.height, "samples": model.samples, "depth": model.depth,

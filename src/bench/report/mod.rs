@@ -270,7 +270,12 @@ impl Format {
 }
 
 /// What the names of counts mean, a line each.
-pub const WORDS: [(&str, &str); 11] = [
+pub const WORDS: [(&str, &str); 16] = [
+    ("*", "tests so much that it got an even sample of the rays"),
+    ("n_in", "inner nodes"),
+    ("n_v", "leaf cells"),
+    ("n_ev", "empty ones among them"),
+    ("t_b", "time to build"),
     ("n_it", "ray/prim tests a ray"),
     ("n_ts", "nodes and cells visited a ray"),
     ("n_ets", "leaf cells visited a ray"),

@@ -5,7 +5,7 @@ use super::published::{Figures, HainesRays};
 use crate::bench::machine::Machine;
 use crate::bench::report::table::Table;
 use crate::bench::report::{Format, html};
-use crate::number::{grouped, short};
+use crate::number::{grouped, hash, short};
 use serde_json::{Value, json};
 
 /// Identifies the JSON of these reports.
@@ -319,7 +319,7 @@ fn scene_json(scene: &Measured) -> Value {
         })
     };
     json!({
-        "scene": scene.published.name, "hash": format!("{:032x}", scene.hash), "objects": scene.objects,
+        "scene": scene.published.name, "hash": hash(scene.hash), "objects": scene.objects,
         "rays": { "both_sides": tally(scene.turned), "outsides": tally(scene.outward) },
         "published_rays": scene.published.rays.to_json(),
         "haines_rays": scene.published.haines.map(|h| json!({

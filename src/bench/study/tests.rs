@@ -174,3 +174,32 @@ fn every_report_has_every_row_and_says_what_to_use() {
     assert!(!html.contains("<balls>") && !html.contains("<script"));
     assert!(format("a.txt").unwrap_err().contains(".html"));
 }
+
+#[test]
+fn settings_take_the_samples_that_render_takes_of_points_and_lines_and_of_scene_files() {
+    let scene = balls();
+    let world = World::new(&scene);
+    let accel = AnyAccel::build(AccelKind::DEFAULT, &world.shapes, &AccelParams::DEFAULT);
+    let view = View::from_camera(&Camera {
+        name: String::new(),
+        projection: Projection::Perspective { y_fov: 0.7, aspect: None },
+        world_from_camera: DAffine3::from_translation(DVec3::Z * 7.0),
+    });
+    let (textures, base, output) = (TextureStore::new(&scene), Settings::default(), Output::default());
+    let of = |samples, fewest| {
+        let (scene, world, accel, textures, view) = (&scene, &world, &accel, &textures, &view);
+        settings(&Subject { scene, world, accel, textures, view, base: &base, samples, fewest, output: &output })
+    };
+    let find = |all: &[Setting], flags: &str| all.iter().find(|s| s.flags == flags).expect(flags).settings.clone();
+    for setting in of(None, 16) {
+        match setting.settings.sampling {
+            Sampling::Stochastic(how) => assert!(how.min_samples >= 16, "{}", setting.flags),
+            _ => assert!(["quality", "stochastic", "depth"].iter().all(|knob| setting.knob.name() != *knob)),
+        }
+    }
+    let (usual, hinted) = (of(None, 1), of(Some(9), 1));
+    let depth = "--depth 1";
+    assert!(matches!(find(&usual, depth).sampling, Sampling::Stochastic(how) if how.min_samples == 1));
+    assert_eq!((find(&hinted, depth).sampling, find(&hinted, depth).samples), (Sampling::Uniform, 9));
+    assert!(matches!(find(&hinted, "--quality normal").sampling, Sampling::Stochastic(_)));
+}

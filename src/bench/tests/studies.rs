@@ -2,11 +2,13 @@
 
 use super::{SIZE, Stage, plan};
 use crate::accel::{AccelKind, Count, RayCounts, auto};
+use crate::bench::clock::Spread;
 use crate::bench::compare::Plan;
 use crate::bench::rays::Class;
 use crate::bench::report::auto::sentences as auto_sentences;
 use crate::bench::report::{Format, Model, Report, text};
 use crate::bench::row::Row;
+use crate::number::grouped;
 
 /// Three sizes of a family whose structures cost what laws say, to the digit.
 fn grown() -> Report {
@@ -171,6 +173,8 @@ fn times_that_overlap_or_come_from_one_pass_are_said_to_be_doubtful() {
         let kinds = vec![AccelKind::FastOctree, AccelKind::FastBvh];
         let mut report = Stage::new().report(Plan { kinds, ..plan() });
         report.plan.passes = times[0].len();
+        // In so small a scene both are one leaf.
+        report.models[0].rows[1].made_of.n_in += 1;
         for (row, times) in report.models[0].rows.iter_mut().zip(times) {
             row.classes.iter_mut().for_each(|c| times.iter().for_each(|&t| c.seconds.push(t)));
         }
@@ -178,16 +182,70 @@ fn times_that_overlap_or_come_from_one_pass_are_said_to_be_doubtful() {
     };
     assert!(told([&[4.0, 5.0], &[6.0, 6.75]]).contains("right: fast-bvh takes 41.7 % more time;"));
     assert!(told([&[4.0, 5.0], &[3.0, 3.3]]).contains("wrong: fast-bvh takes 30.0 % less time;"));
-    assert!(told([&[4.0, 5.0], &[4.5, 9.0]]).contains("(within the spread of the passes)"));
+    let doubtful = told([&[4.0, 5.0], &[4.5, 9.0]]);
+    assert!(doubtful.contains("neither right nor wrong") && doubtful.contains("(within the spread of the passes)"));
     assert!(told([&[4.0], &[6.0]]).contains("50.0 % more time (one pass only"));
 }
 
 #[test]
-fn an_average_ray_is_one_of_the_mixture_that_was_recorded() {
-    let report = Stage::new().report(Plan { kinds: vec![AccelKind::Grid], ..plan() });
-    let (model, row) = (&report.models[0], &report.models[0].rows[0]);
-    let tests: u64 = row.classes.iter().map(|c| c.counts.n_it).sum();
-    assert!((model.per_ray(row, Count::It) - tests as f64 / row.rays() as f64).abs() < 1e-9);
+fn of_one_tree_the_clock_is_not_asked() {
+    let kinds = vec![AccelKind::FastOctree, AccelKind::FastBvh];
+    let mut report = Stage::new().report(Plan { kinds, passes: 2, ..plan() });
+    let [octree, bvh] = &mut report.models[0].rows[..] else { panic!("two structures") };
+    octree.classes.iter_mut().for_each(|class| [4.0, 5.0].into_iter().for_each(|t| class.seconds.push(t)));
+    bvh.classes.iter_mut().for_each(|class| [1.0, 2.0].into_iter().for_each(|t| class.seconds.push(t)));
+    let told = auto_sentences(&report, &report.models[0]).swap_remove(1);
+    assert_eq!(told, "On these rays that makes no difference: fast-bvh is the same tree");
+}
+
+#[test]
+fn a_rate_is_that_of_the_median_time_also_of_two_passes() {
+    let mut report = Stage::new().report(Plan { kinds: vec![AccelKind::Grid], passes: 1, ..plan() });
+    let class = &mut report.models[0].rows[0].classes[0];
+    class.seconds = Spread::default();
+    [2e-6, 6e-6].into_iter().for_each(|seconds| class.seconds.push(seconds));
+    let [median, min, max] = class.rates();
+    assert!((median - 0.25).abs() < 1e-12 && (min - 1.0 / 6.0).abs() < 1e-12 && (max - 0.5).abs() < 1e-12);
+    let json: serde_json::Value = serde_json::from_str(&Format::Json.write(&report)).unwrap();
+    assert_eq!(json["models"][0]["structures"][0]["classes"]["primary"]["mrays"]["median"], median);
+}
+
+#[test]
+fn an_average_ray_is_one_of_the_mixture_that_the_picture_asks_however_many_are_kept() {
+    let stage = Stage::new();
+    let all = stage.report(Plan { kinds: vec![AccelKind::Grid], ..plan() });
+    let tests: u64 = all.models[0].rows[0].classes.iter().map(|c| c.counts.n_it).sum();
+    let mean = |report: &Report| report.models[0].per_ray(&report.models[0].rows[0], Count::It);
+    assert!((mean(&all) - tests as f64 / all.models[0].rows[0].rays() as f64).abs() < 1e-9);
+    // Of each class as many as of the smallest, which costs another number of tests than the others.
+    let mut few = all.clone();
+    let (model, least) = (&mut few.models[0], all.models[0].rays.iter().map(|rays| rays.kept).min().unwrap());
+    for (rays, class) in model.rays.iter_mut().zip(&mut model.rows[0].classes) {
+        assert_eq!(rays.asked, class.counts.queries);
+        class.counts.n_it = class.counts.n_it * 1000 / rays.asked;
+        (rays.kept, class.counts.queries) = (least, 1000);
+    }
+    assert!((mean(&few) / mean(&all) - 1.0).abs() < 1e-2, "{} {}", mean(&few), mean(&all));
+}
+
+#[test]
+fn hits_are_identical_of_the_rays_that_two_structures_got() {
+    let stage = Stage::new();
+    let prims = stage.world.shapes.len() as u64;
+    let report = |kinds: &[AccelKind]| stage.report(Plan { kinds: kinds.into(), slow_tests: 30 * prims, ..plan() });
+    let told = |kinds: &[AccelKind]| report(kinds).models[0].verdict();
+    let all = report(&[AccelKind::Grid, AccelKind::Bvh, AccelKind::None]);
+    let (sent, few) = (all.models[0].rows[0].rays(), all.models[0].rows[2].rays());
+    assert!(few < sent && all.models[0].verdict().ends_with(&format!("{} rays (a sample for none)", grouped(sent))));
+    assert!(told(&[AccelKind::None, AccelKind::Boxes]).ends_with(&format!("structures: {few} rays")));
+    assert!(told(&[AccelKind::Grid, AccelKind::None]).ends_with(&format!("structures: {few} rays")));
+    let alone = report(&[AccelKind::None]);
+    assert!(alone.models[0].verdict().contains(&format!("only, {few} rays")));
+    let json: serde_json::Value = serde_json::from_str(&Format::Json.write(&alone)).unwrap();
+    assert_eq!(
+        (&json["models"][0]["identical"], &json["models"][0]["compared"]),
+        (&serde_json::Value::Null, &0.into())
+    );
 }
 
 #[test]

@@ -39,7 +39,7 @@ pub(in crate::cli) struct StudyArgs {
     /// Other numbers give other renderings
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Run")]
     pub seed: u64,
-    /// Structure that the rays go through; all find the same hits
+    /// Structure that the rays go through; all find the same hits with the exact test
     #[arg(long, value_name = "NAME", value_parser = parse::named::<AccelChoice>(), default_value = AccelChoice::AUTO,
           help_heading = "Run")]
     pub accel: AccelChoice,

@@ -5,7 +5,7 @@ use crate::accel::{AccelChoice, AccelParams};
 use crate::load::paths::FileFault;
 use crate::load::{AnimationFacts, Loaded, WireFacts};
 use crate::math::{DVec3, Vec3};
-use crate::number::{bytes, grouped, so_many};
+use crate::number::{bytes, grouped, hash, so_many};
 use crate::render::World;
 use crate::scene::default_light;
 use crate::scene::features::Features;
@@ -178,7 +178,7 @@ impl<'a> Report<'a> {
         lines.add("memory", format!("about {memory}"));
         let facts = &self.loaded.facts;
         lines.add("files", shorten(facts.files.iter().map(|f| f.path.display().to_string())));
-        lines.add("hash", format!("{:032x}", facts.hash));
+        lines.add("hash", hash(facts.hash));
         lines.count("warnings", self.loaded.warnings.iter().map(|w| u64::from(w.count)).sum(), "");
     }
 
@@ -202,7 +202,7 @@ impl<'a> Report<'a> {
         let mut value = json!({
             "schema": "meshray-inspect/1",
             "file": self.file.to_string_lossy(), "format": facts.format, "generator": facts.generator,
-            "hash": format!("{:032x}", facts.hash),
+            "hash": hash(facts.hash),
             "files": facts.files.iter().map(|f| f.path.to_string_lossy()).collect::<Vec<_>>(),
             "triangles": self.world.triangles(), "polygons": shapes.polygons.len(), "faces": facts.faces,
             "spheres": shapes.spheres.len(), "cones": shapes.cones.len(), "planes": shapes.planes.len(),

@@ -4,6 +4,7 @@ use super::Told;
 use super::words::{in_world, inside, light, object, place};
 use crate::accel::probe::{Extent, Place, Test, Visit};
 use crate::accel::{Hit, RayCounts};
+use crate::number::hash;
 use crate::render::Question;
 use crate::render::story::{Class, Event, Query};
 use serde_json::{Map, Value, json};
@@ -15,7 +16,7 @@ pub(super) fn write(told: &Told) -> String {
         "schema": "meshray-trace/1",
         "version": super::super::version::SHORT,
         "file": told.name,
-        "hash": format!("{:032x}", told.loaded.facts.hash),
+        "hash": hash(told.loaded.facts.hash),
         "view": told.view,
         "width": settings.width,
         "height": settings.height,

@@ -5,7 +5,7 @@ use crate::accel::{AccelKind, IntersectorKind};
 use crate::bench::aim::Aim;
 use crate::bench::verify::tally::{Rate, Tally};
 use crate::bench::verify::{Findings, Plan, Row, Section};
-use crate::number::{grouped, short};
+use crate::number::{grouped, hash, short};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -194,7 +194,7 @@ impl Report<'_> {
             .collect();
         let value = json!({
             "schema": "meshray-verify/1", "version": SHORT, "file": self.name,
-            "hash": format!("{:032x}", self.hash), "triangles": f.triangles, "others": f.others,
+            "hash": hash(self.hash), "triangles": f.triangles, "others": f.others,
             "rays": self.plan.rays, "seed": self.plan.seed,
             "variations": f.sections.iter().map(section_json).collect::<Vec<_>>(),
             "costs": costs, "choose": self.choice().name(), "trusted": f.trusted(),

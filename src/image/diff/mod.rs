@@ -244,8 +244,8 @@ mod tests {
         let d = compare(&of(0), &of(1), Space::Display, 1.0 / 255.0).unwrap();
         assert_eq!((d.max, d.worst, d.over, d.channels), (1.0 / 255.0, (0, 0), 0, 4));
         assert_eq!(compare(&of(0), &of(1), Space::Display, 0.003_921_5).unwrap().over, 255);
-        let wide = |first: u16| {
-            let light = |code: u16| srgb::decode(f64::from(code) / 65535.0) as f32;
+        let wide = |first: u32| {
+            let light = |code: u32| srgb::decode(f64::from(code) / 65535.0) as f32;
             Picture::of(65535, 1, (first..first + 65535).map(|code| [light(code), 0.0, 0.0, 1.0]).collect())
         };
         let d = compare(&wide(0), &wide(1), Space::Display, 1.0 / 65535.0).unwrap();

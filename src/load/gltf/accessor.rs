@@ -358,6 +358,7 @@ fn raws(element: &[u8], format: Format) -> [f64; 16] {
     std::array::from_fn(|k| if k < format.width() { raw(element, format, k) } else { 0.0 })
 }
 
+/// How far numbers of elements reach, those that are finite.
 fn extent_of(elements: impl Iterator<Item = [f64; 16]>, format: Format) -> Extent {
     let mut extent = [(f64::INFINITY, f64::NEG_INFINITY); 16];
     for element in elements {
@@ -368,7 +369,7 @@ fn extent_of(elements: impl Iterator<Item = [f64; 16]>, format: Format) -> Exten
     extent
 }
 
-/// The same of vectors of three floats; `None`: they are none, or have numbers that are not finite.
+/// As [`extent_of`] has it, of vectors of three floats; `None`: they are none, or have numbers that are not finite.
 fn extent_of_vectors(mut vectors: impl Iterator<Item = Option<[f32; 3]>>) -> Option<Extent> {
     let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     // Products with 0 tell what is not finite.

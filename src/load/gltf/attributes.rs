@@ -5,7 +5,7 @@
 use super::codes::Code;
 use super::document::is_semantic;
 use super::report::Report;
-use super::schema::{list, whole};
+use super::schema::{list, position, whole};
 use super::variants;
 use serde_json::{Map, Value};
 use std::collections::HashMap;
@@ -142,18 +142,18 @@ impl<'a> Check<'a> {
     }
 
     fn attribute(&mut self, name: &str, shape: &Shape, place: &str, morph: bool) {
+        let is_own = name.starts_with('_');
         if shape.component == UNSIGNED_INT {
             self.report.add(
                 Code::MeshPrimitiveAttributesAccessorUnsignedInt,
                 place,
                 "32-bit integers are no vertex data",
             );
-        } else if name.starts_with('_') {
-        } else if !is_semantic(name) {
+        } else if !is_own && !is_semantic(name) {
             let text = format!("'{}' is no attribute", crate::load::paths::shorten(name));
             self.report.add(Code::MeshPrimitiveInvalidAttribute, place, text);
             return;
-        } else {
+        } else if !is_own {
             self.format(name, shape, place, morph);
         }
         if name == "POSITION" && !shape.bounded {
@@ -169,7 +169,8 @@ impl<'a> Check<'a> {
         }
         let norm = if shape.normalized { ", normalized" } else { "" };
         let text = format!("{name} cannot be {} of {}{norm}", shape.kind, component_name(shape.component));
-        if name == "POSITION" && !morph && fit == Fit::No {
+        // Of other formats nothing can be read; floats that are called normalized are what they are.
+        if name == "POSITION" && !morph && shape.kind != "VEC3" {
             self.report.add(Code::MeshPrimitiveAttributesAccessorInvalidFormat, place, text);
         } else {
             self.report.warn(Code::MeshPrimitiveAttributesAccessorInvalidFormat, place, text);
@@ -300,7 +301,7 @@ impl<'a> Check<'a> {
         let index = whole(index)?;
         let accessor = list(self.root, "accessors").get(usize::try_from(index).ok()?)?;
         let number = |name| accessor.get(name).and_then(whole);
-        let view = number("bufferView").and_then(|i| usize::try_from(i).ok());
+        let view = accessor.get("bufferView").and_then(position);
         Some(Shape {
             index,
             component: number("componentType")?,
@@ -369,7 +370,7 @@ fn fit(name: &str, shape: &Shape, morph: bool) -> Fit {
 fn weighted(root: &Value, played: bool) -> Vec<Vec<bool>> {
     let weights = |value: &Value| list(value, "weights").iter().map(|w| w.as_f64() != Some(0.0)).collect::<Vec<_>>();
     let mut all: Vec<Vec<bool>> = list(root, "meshes").iter().map(weights).collect();
-    let shown = |node: &Value| node.get("mesh").and_then(whole).and_then(|mesh| usize::try_from(mesh).ok());
+    let shown = |node: &Value| node.get("mesh").and_then(position);
     for node in list(root, "nodes") {
         let Some(own) = shown(node).and_then(|mesh| all.get_mut(mesh)) else { continue };
         let more = weights(node);

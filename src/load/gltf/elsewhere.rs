@@ -1,6 +1,6 @@
 //! Files that a URI does not lead to, looked for near the model: the name is often that of another machine.
 
-use crate::load::mtl::Finder;
+use crate::load::finder::Finder;
 use crate::load::paths::{FileFault, Resolver};
 use percent_encoding::percent_decode_str;
 use std::path::{Path, PathBuf};
@@ -16,9 +16,7 @@ pub(super) fn find(uri: &str, why: &FileFault, resolver: &mut Resolver, missed: 
         return None;
     }
     let name = percent_decode_str(uri.split('?').next()?).decode_utf8().ok()?;
-    let mut finder = Finder { resolver, missed: *missed };
-    let found = finder.find(&name, &[Path::new("")]);
-    *missed = finder.missed;
+    let found = Finder { resolver, missed }.find(&name, &[Path::new("")]);
     found.ok().filter(|place| place.guessed).map(|place| place.path)
 }
 

@@ -2,7 +2,7 @@
 
 use super::codes::Code;
 use super::report::Report;
-use super::schema::{list, whole};
+use super::schema::{list, position};
 use crate::math::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -124,7 +124,7 @@ impl Graph {
 
 fn indices<'a>(value: &'a Value, name: &str) -> impl Iterator<Item = usize> + use<'a> {
     let list = value.get(name).and_then(Value::as_array).into_iter().flatten();
-    list.filter_map(|index| whole(index).and_then(|i| usize::try_from(i).ok()))
+    list.filter_map(position)
 }
 
 fn parents(nodes: &[Value], report: &mut Report) -> Vec<Option<usize>> {

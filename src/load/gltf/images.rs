@@ -5,6 +5,7 @@ use super::codes::Code;
 use super::elsewhere;
 use super::gloss;
 use super::report::Report;
+use super::schema::position;
 use super::textures::Picture;
 use crate::load::limits::{Budget, Limits, OverBudget};
 use crate::load::paths::{Resolver, taken_from};
@@ -274,8 +275,7 @@ fn check_textures(root: &Root, images: &Images, report: &mut Report) {
 
 fn extension_source(texture: &Texture, name: &str) -> Option<usize> {
     let extensions = texture.extensions.as_ref()?;
-    let source = super::schema::whole(extensions.others.get(name)?.get("source")?)?;
-    usize::try_from(source).ok()
+    position(extensions.others.get(name)?.get("source")?)
 }
 
 /// The image that a texture shows: WebP where the file offers it, then the plain one, then KTX2, which has lost something

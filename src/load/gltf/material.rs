@@ -143,12 +143,8 @@ fn metal_rough(source: &json::Material, textures: &mut Textures) -> MetalRough {
     surface.thickness = number(VOLUME, "thicknessFactor").map_or(0.0, |t| within(t, 0.0, f32::MAX, 0.0));
     surface.thick = surface.thickness > 0.0;
     if let Some(distance) = number(VOLUME, "attenuationDistance").filter(|_| surface.thick) {
-        let part = |k: usize| {
-            let color = extensions.others.get(VOLUME)?.get("attenuationColor")?;
-            Some(within(color.get(k)?.as_f64()? as f32, 0.0, 1.0, 1.0))
-        };
-        let color = Vec3::from([0, 1, 2].map(|k| part(k).unwrap_or(1.0)));
-        surface.absorption = MetalRough::absorption_of(color, distance);
+        let color = extensions.others.get(VOLUME).map(|volume| color_of(volume, "attenuationColor", 1.0));
+        surface.absorption = MetalRough::absorption_of(color.unwrap_or(Vec3::ONE), distance);
     }
     surface.dispersion =
         number("KHR_materials_dispersion", "dispersion").map_or(0.0, |d| within(d, 0.0, f32::MAX, 0.0));
@@ -170,13 +166,20 @@ fn number_of(extension: &Value, name: &str, default: f32, (low, high): (f32, f32
     extension.get(name).and_then(Value::as_f64).map_or(default, |x| within(x as f32, low, high, default))
 }
 
+/// A colour in an extension's object, 0 … 1; parts that are not there are as by default.
+fn color_of(extension: &Value, name: &str, default: f32) -> Vec3 {
+    let color = extension.get(name);
+    let part = |k: usize| color.and_then(|color| color.get(k)?.as_f64());
+    Vec3::from([0, 1, 2].map(|k| part(k).map_or(default, |c| within(c as f32, 0.0, 1.0, default))))
+}
+
 /// KHR_materials_anisotropy; `None` where its strength is zero.
 fn grain(extension: &Value, textures: &mut Textures) -> Option<Grain> {
     let strength = number_of(extension, "anisotropyStrength", 0.0, (0.0, 1.0));
     (strength > 0.0).then(|| Grain {
         strength,
         rotation: number_of(extension, "anisotropyRotation", 0.0, (f32::MIN, f32::MAX)),
-        map: textures.info(info_of(Some(extension), "anisotropyTexture").as_ref()),
+        map: map_of(extension, "anisotropyTexture", textures),
     })
 }
 
@@ -184,7 +187,7 @@ fn grain(extension: &Value, textures: &mut Textures) -> Option<Grain> {
 fn film(extension: &Value, textures: &mut Textures) -> Option<Film> {
     let strength = number_of(extension, "iridescenceFactor", 0.0, (0.0, 1.0));
     let thickness = |name: &str, default| number_of(extension, name, default, (0.0, f32::MAX));
-    let mut map = |name: &str| textures.info(info_of(Some(extension), name).as_ref());
+    let mut map = |name: &str| map_of(extension, name, textures);
     (strength > 0.0).then(|| Film {
         strength,
         strength_map: map("iridescenceTexture"),
@@ -196,9 +199,8 @@ fn film(extension: &Value, textures: &mut Textures) -> Option<Film> {
 
 /// KHR_materials_sheen; `None` where its colour is black.
 fn sheen(extension: &Value, textures: &mut Textures) -> Option<Sheen> {
-    let part = |k: usize| extension.get("sheenColorFactor")?.get(k)?.as_f64();
-    let color = Vec3::from([0, 1, 2].map(|k| part(k).map_or(0.0, |c| within(c as f32, 0.0, 1.0, 0.0))));
-    let mut map = |name: &str| textures.info(info_of(Some(extension), name).as_ref());
+    let color = color_of(extension, "sheenColorFactor", 0.0);
+    let mut map = |name: &str| map_of(extension, name, textures);
     (color != Vec3::ZERO).then(|| Sheen {
         color,
         color_map: map("sheenColorTexture"),
@@ -209,13 +211,12 @@ fn sheen(extension: &Value, textures: &mut Textures) -> Option<Sheen> {
 
 /// KHR_materials_diffuse_transmission; `None` where nothing goes through.
 fn translucence(extension: &Value, textures: &mut Textures) -> Option<Translucence> {
-    let part = |k: usize| extension.get("diffuseTransmissionColorFactor")?.get(k)?.as_f64();
     let share = number_of(extension, "diffuseTransmissionFactor", 0.0, (0.0, 1.0));
-    let mut map = |name: &str| textures.info(info_of(Some(extension), name).as_ref());
+    let mut map = |name: &str| map_of(extension, name, textures);
     (share > 0.0).then(|| Translucence {
         share,
         share_map: map("diffuseTransmissionTexture"),
-        color: Vec3::from([0, 1, 2].map(|k| part(k).map_or(1.0, |c| within(c as f32, 0.0, 1.0, 1.0)))),
+        color: color_of(extension, "diffuseTransmissionColorFactor", 1.0),
         color_map: map("diffuseTransmissionColorTexture"),
     })
 }
@@ -228,7 +229,7 @@ fn coat(extension: &Value, textures: &mut Textures) -> Option<Coat> {
         return None;
     }
     let scale = extension.get("clearcoatNormalTexture").and_then(|t| t.get("scale")).and_then(Value::as_f64);
-    let mut map = |name: &str| textures.info(info_of(Some(extension), name).as_ref());
+    let mut map = |name: &str| map_of(extension, name, textures);
     Some(Coat {
         strength,
         strength_map: map("clearcoatTexture"),
@@ -239,6 +240,11 @@ fn coat(extension: &Value, textures: &mut Textures) -> Option<Coat> {
     })
 }
 
+/// A map in an extension's object, as a texture of ours.
+fn map_of(extension: &Value, name: &str, textures: &mut Textures) -> Option<TextureRef> {
+    textures.info(info_of(Some(extension), name).as_ref())
+}
+
 /// A map in an extension's object.
 fn info_of(extension: Option<&Value>, name: &str) -> Option<json::texture::Info> {
     serde_json::from_value(extension?.get(name)?.clone()).ok()
@@ -247,25 +253,20 @@ fn info_of(extension: Option<&Value>, name: &str) -> Option<json::texture::Info>
 /// KHR_materials_pbrSpecularGlossiness as a dielectric whose reflection has the given colour at normal incidence, the
 /// way KHR_materials_ior describes for its special index 0. What else the material says is a fallback.
 fn from_specular_glossiness(extension: &Value, material: &mut Material, textures: &mut Textures) -> MetalRough {
-    let number = |name: &str, k: Option<usize>| {
-        let value = extension.get(name)?;
-        let value = k.map_or(Some(value), |k| value.get(k))?.as_f64()?;
-        Some(within(value as f32, 0.0, 1.0, 1.0))
-    };
-    let color = |name: &str| Vec3::from([0, 1, 2].map(|k| number(name, Some(k)).unwrap_or(1.0)));
-    let mut map = |name: &str| textures.info(info_of(Some(extension), name).as_ref());
-    material.base_color = color("diffuseFactor");
-    material.opacity = number("diffuseFactor", Some(3)).unwrap_or(1.0);
+    let opacity = extension.get("diffuseFactor").and_then(|color| color.get(3)?.as_f64());
+    let mut map = |name: &str| map_of(extension, name, textures);
+    material.base_color = color_of(extension, "diffuseFactor", 1.0);
+    material.opacity = opacity.map_or(1.0, |opacity| within(opacity as f32, 0.0, 1.0, 1.0));
     material.base_color_map = map("diffuseTexture");
     let specular_color_map = map("specularGlossinessTexture");
-    let gloss = number("glossinessFactor", None).unwrap_or(1.0);
+    let gloss = number_of(extension, "glossinessFactor", 1.0, (0.0, 1.0));
     let metal_rough_map = textures.roughness(info_of(Some(extension), "specularGlossinessTexture").as_ref(), gloss);
     MetalRough {
         metallic: 0.0,
         // The map has all of it.
         roughness: if metal_rough_map.is_some() { 1.0 } else { 1.0 - gloss },
         metal_rough_map,
-        specular_color: color("specularFactor"),
+        specular_color: color_of(extension, "specularFactor", 1.0),
         specular_color_map,
         ior: 0.0,
         ..MetalRough::default()

@@ -263,7 +263,7 @@ impl Task<'_, '_> {
                 let place = self.place(&part);
                 self.report.add(Code::AccessorInvalidFloat, place, "texture coordinates that are not finite numbers");
             }
-            // Attribute names end well before this could be large.
+            // Numbers of sets have 16 bits, and empty ones were charged (`cost`).
             let slot = set as usize;
             if mesh.uvs.len() <= slot {
                 mesh.uvs.resize(slot + 1, Vec::new());

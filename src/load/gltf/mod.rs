@@ -68,6 +68,7 @@ use crate::scene::{Environment, Instance, Scene};
 use accessor::Reader;
 use animation::Pose;
 use buffers::Buffers;
+use container::Container;
 use document::Document;
 use gltf::json::Root;
 use gltf::json::mesh as source;
@@ -142,7 +143,7 @@ impl Loading<'_> {
         let mut facts = facts(&document, container.binary);
         facts.extensions = extensions.facts();
         (facts.variants, facts.variant) = (variants, variant);
-        let scene = self.build(&document, &mut graph, container.bin, budget, &mut facts)?;
+        let scene = self.build(&document, &mut graph, &container, budget, &mut facts)?;
         Ok(Loaded { scene, facts, warnings: Vec::new() })
     }
 
@@ -157,12 +158,12 @@ impl Loading<'_> {
         &mut self,
         document: &Document,
         graph: &mut Graph,
-        bin: Option<&[u8]>,
+        container: &Container,
         budget: &mut Budget,
         facts: &mut Facts,
     ) -> Result<Scene, LoadError> {
-        let (root, file) = (&document.root, self.source.path.as_path());
-        if bin.is_none() && facts.format.ends_with("(binary)") {
+        let (root, file, bin) = (&document.root, self.source.path.as_path(), container.bin);
+        if container.binary && bin.is_none() {
             self.check_chunk(root);
         }
         let mut resolver = Resolver::new(self.source, self.options);

@@ -330,6 +330,11 @@ pub(super) fn whole(value: &Value) -> Option<u64> {
     value.as_u64().or_else(|| value.as_f64().and_then(exact))
 }
 
+/// A place in a list of the document.
+pub(super) fn position(value: &Value) -> Option<usize> {
+    usize::try_from(whole(value)?).ok()
+}
+
 /// A value in a message.
 fn show(value: &Value) -> String {
     match value {

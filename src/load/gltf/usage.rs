@@ -2,7 +2,7 @@
 
 use super::codes::Code;
 use super::report::Report;
-use super::schema::{list, whole};
+use super::schema::{list, position};
 use serde_json::Value;
 
 /// What data is used for.
@@ -109,10 +109,6 @@ impl<'a> Check<'a> {
             self.report.add(Code::BufferViewTargetOverride, place(), text);
         }
     }
-}
-
-fn position(value: &Value) -> Option<usize> {
-    usize::try_from(whole(value)?).ok()
 }
 
 #[cfg(test)]

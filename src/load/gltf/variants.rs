@@ -4,6 +4,7 @@
 
 use super::codes::Code;
 use super::report::Report;
+use super::schema::position;
 use gltf::json::Root;
 use gltf::json::mesh::Primitive;
 use serde_json::Value;
@@ -27,15 +28,11 @@ pub(super) fn material(primitive: &Primitive, variant: Option<usize>) -> Option<
 pub(super) fn material_in(primitive: &Value, variant: Option<usize>) -> Option<usize> {
     let extension = primitive.get("extensions").and_then(|e| e.get(NAME));
     let mapped = variant.and_then(|variant| mapped(extension, variant).next());
-    mapped.map(|(_, material)| material).or_else(|| primitive.get("material").and_then(number))
+    mapped.map(|(_, material)| material).or_else(|| primitive.get("material").and_then(position))
 }
 
 fn extension(primitive: &Primitive) -> Option<&Value> {
     primitive.extensions.as_ref()?.others.get(NAME)
-}
-
-fn number(value: &Value) -> Option<usize> {
-    super::schema::whole(value).and_then(|n| usize::try_from(n).ok())
 }
 
 /// Warns where two mappings of a primitive speak of the variant.
@@ -57,7 +54,7 @@ fn mapped(extension: Option<&Value>, variant: usize) -> impl Iterator<Item = (us
     let mappings = extension.and_then(|e| e.get("mappings")).and_then(Value::as_array).into_iter().flatten();
     mappings.enumerate().filter_map(move |(i, mapping)| {
         let variants = mapping.get("variants")?.as_array()?;
-        let speaks = variants.iter().any(|v| number(v) == Some(variant));
-        Some((i, mapping.get("material").and_then(number)?)).filter(|_| speaks)
+        let speaks = variants.iter().any(|v| position(v) == Some(variant));
+        Some((i, mapping.get("material").and_then(position)?)).filter(|_| speaks)
     })
 }

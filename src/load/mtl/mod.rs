@@ -2,7 +2,6 @@
 //!
 //! Own code, because `tobj` stops at `Kd 0.5`, takes two file names for one, and leaves map options to its caller.
 
-mod library;
 mod meaning;
 mod options;
 mod parse;
@@ -10,6 +9,7 @@ mod pictures;
 mod textures;
 mod writer;
 
+use crate::load::finder::Finder;
 use crate::load::limits::{Budget, Limits};
 use crate::load::paths::{Found, Resolver, shorten, taken_from};
 use crate::load::text::lines::without_comment;
@@ -17,7 +17,6 @@ use crate::load::{Diagnostic, LoadOptions, MtlMode, Warnings, detect};
 use crate::math::Vec3;
 use crate::scene::{Bitmap, Material, Texture};
 use crate::stopwatch::Spent;
-pub(super) use library::{Finder, Place, unquote};
 use meaning::Meaning;
 use parse::{Mtl, Slot};
 use std::collections::{HashMap, HashSet};
@@ -82,10 +81,9 @@ pub(super) fn load(libraries: &[(u32, String)], names: &[Option<&str>], reading:
     for (number, library) in read.iter().enumerate() {
         let materials = used.iter().filter(|u| u.0 == number).map(|u| &library.materials[u.1]);
         let of = Library { number, file: &library.file, folder: &library.folder };
-        let mut finder = Finder { resolver: reading.resolver, missed };
+        let mut finder = Finder { resolver: reading.resolver, missed: &mut missed };
         let limits: (&Limits, &mut Budget) = (&reading.options.limits, reading.budget);
         textures.read(&of, materials, reading.options.mtl, &mut finder, limits, reading.warnings);
-        missed = finder.missed;
     }
 
     // The materials themselves.
@@ -120,13 +118,12 @@ fn read_libraries(libraries: &[(u32, String)], reading: &mut Reading) -> Vec<Rea
     let mut out = Vec::new();
     let (mut seen, mut missed) = (HashSet::new(), 0);
     for (line, names) in libraries {
-        let mut finder = Finder { resolver: reading.resolver, missed };
+        let mut finder = Finder { resolver: reading.resolver, missed: &mut missed };
         let mut found = finder.libraries(names);
         let cut = String::from_utf8_lossy(without_comment(names.as_bytes())).into_owned();
         if cut != *names && !found.iter().all(Result::is_ok) {
             found = finder.libraries(&cut);
         }
-        missed = finder.missed;
         for file in found {
             match file {
                 Ok(file) if seen.insert(file.path.clone()) => out.push(read_library(file, *line, names, reading)),

@@ -1,9 +1,9 @@
 //! Maps of materials -> textures of the scene.
 
-use super::library::{Finder, Place, unquote};
 use super::options::{Channel, Map};
 use super::parse::{Mtl, Slot};
 use super::pictures::{Alpha, Pictures, Take};
+use crate::load::finder::{Finder, Place, unquote};
 use crate::load::limits::{Budget, Limits, OverBudget};
 use crate::load::paths::{FileFault, taken_from};
 use crate::load::texture::{Encoded, Unusable, decode_all};

@@ -1,7 +1,7 @@
 //! The header of a PLY file: lines of words that end with `end_header`.
 
 use crate::load::Diagnostic;
-use crate::load::mtl::unquote;
+use crate::load::finder::unquote;
 use crate::load::paths::shorten;
 use crate::load::text::encoding::decode_name;
 use crate::load::text::without_mark;

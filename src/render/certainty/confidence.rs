@@ -3,8 +3,9 @@
 use super::GROUPS;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// Degrees of freedom of an estimate from [`GROUPS`] means.
+/// Degrees of freedom of an estimate from [`GROUPS`] means. What is written out in closed form holds for seven.
 const FREEDOM: f64 = (GROUPS - 1) as f64;
+const _: () = assert!(GROUPS == 8);
 
 /// How many estimated standard errors the error that is allowed must be, so that a pixel that stops at the first look
 /// which finds it so is within that error with probability `confidence`.

@@ -14,7 +14,7 @@ const GRAZING: f32 = 50.0;
 /// than all roundings.
 const ROUNDING: f32 = 4e-6;
 
-/// Nothing is known of a triangle with this part of the area of one of the same edges, or less.
+/// A triangle is left out of which two edges' lengths, multiplied, are more than this many times twice its area.
 const SLENDER: f64 = 500.0;
 
 /// Error of coordinates, texels, beside that.

@@ -143,7 +143,7 @@ impl Around {
                     }
                     self.compare(stopped);
                     if stopped.facts.error > error && stopped.used(judge) > 1.0 {
-                        (stopped.facts.end, stopped.facts.spare) = (End::Ceiling, 0);
+                        (stopped.facts.end, stopped.facts.spare) = (End::Open, 0);
                         late.push(number);
                     }
                 }
@@ -174,7 +174,7 @@ impl Around {
                 for x in x.saturating_sub(reach).max(tile.x0)..(x + reach + 1).min(tile.x1) {
                     let mut number = self.numbers[self.at((x, y))] as usize;
                     match pixels.get_mut(number) {
-                        Some(pixel) if pixel.is_done_with(samples) => pixel.facts.end = End::Ceiling,
+                        Some(pixel) if pixel.is_done_with(samples) => pixel.facts.end = End::Open,
                         Some(_) => continue,
                         None => {
                             number = pixels.len();
@@ -299,10 +299,10 @@ mod tests {
         for &i in &some {
             pixels[i].join_groups();
             pixels[i].take(&[Sample { radiance: Vec3::ONE, through: Vec3::ZERO }; GROUPS], &[], 2);
-            pixels[i].facts.end = End::Ceiling;
+            pixels[i].facts.end = End::Open;
         }
         look(&mut around, &mut pixels, &some);
         assert_eq!(around.late(&judge, &mut pixels, (&some, 16), TILE), [4]);
-        assert!(pixels[4].facts.end == End::Ceiling);
+        assert!(pixels[4].facts.end == End::Open);
     }
 }

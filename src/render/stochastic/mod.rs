@@ -130,7 +130,7 @@ impl<'a> Sampler<'a> {
             if to >= FIRST_LOOK {
                 self.look(tracer, &mut course, to)?;
             }
-            course.active.retain(|&i| course.pixels[i].facts.end == End::Ceiling);
+            course.active.retain(|&i| course.pixels[i].facts.end == End::Open);
             from = to;
         }
         for pixel in course.pixels.iter_mut().filter(|pixel| pixel.variance().is_some()) {
@@ -212,7 +212,7 @@ impl<'a> Sampler<'a> {
         TilePixels {
             beauty: vec![[0.0; 4]; pixels],
             veil: vec![[0.0; 4]; if frame.has_veil { pixels } else { 0 }],
-            facts: vec![PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling }; pixels],
+            facts: vec![PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Open }; pixels],
             layers: vec![LayerPixel::new(&[], frame.view.eye, frame.view.forward); layers],
             ..TilePixels::empty(tile)
         }

@@ -33,7 +33,7 @@ impl Pixel {
             key: pixel_key(seed, at),
             groups: Default::default(),
             layers: layers.then(Box::default),
-            facts: PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling },
+            facts: PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Open },
             variance: None,
             contrast: 0.0,
             brightest: 0.0,

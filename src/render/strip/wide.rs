@@ -6,8 +6,8 @@ use crate::render::draws::Spread;
 
 /// What each point draws of one light.
 pub(super) struct Drawn {
-    /// Whether places are parts of a sequence, of the same that begin there; else they are moved so far. All points of a
-    /// picture draw in one way.
+    /// Whether points draw [`Spread::Part`] (from `keys` and `firsts`) or [`Spread::Moved`] (from `shifts`): the same for all
+    /// points of a picture.
     is_sequence: bool,
     keys: [u32; POINTS],
     firsts: [u32; POINTS],

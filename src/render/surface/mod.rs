@@ -1,7 +1,7 @@
 //! From a hit to the surface there: position with its error, normals, and the coordinates textures are read with.
 //!
-//! Evaluated once, for the hit that counts. Nothing here knows of light; materials are only asked for their normal and
-//! bump maps. Whatever a file gives, normals come out finite and of unit length.
+//! Evaluated once, for the hit that counts. Nothing here knows of light; materials are asked for their normal and bump maps,
+//! and for what tells where they are there at all. Whatever a file gives, normals come out finite and of unit length.
 
 use super::branch::Ground;
 use super::context::Context;

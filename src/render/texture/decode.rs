@@ -120,7 +120,7 @@ pub(super) fn unit16(code: u16) -> f32 {
     f32::from(code) / 65535.0
 }
 
-/// The same of a texel without alpha.
+/// As [`decode8`] does, of a texel without alpha.
 #[inline(always)]
 pub(super) fn solid8([r, g, b]: [u8; 3], colors: &[f32; 256]) -> Vec4 {
     let color = |c: u8| colors[usize::from(c)];

@@ -213,7 +213,7 @@ impl World {
     #[must_use]
     pub fn with_everything(mut self) -> Self {
         self.shapes.opaque = BitSet::filled(self.shapes.len(), false);
-        self.kept.set_opaque(false);
+        self.kept.open_all();
         self
     }
 

@@ -11,6 +11,7 @@
 use crate::bench::clock::Spread;
 use crate::bench::machine::Machine;
 use crate::bench::study::Study;
+use crate::number::hash;
 use serde_json::{Value, json};
 
 /// The whole study.
@@ -47,7 +48,7 @@ pub fn write(study: &Study) -> String {
         "schema": "meshray-study/1",
         "version": env!("CARGO_PKG_VERSION"),
         "file": study.name,
-        "hash": format!("{:032x}", study.hash),
+        "hash": hash(study.hash),
         "view": study.view,
         "width": study.size.0,
         "height": study.size.1,

@@ -1,6 +1,7 @@
 //! Pictures that files of bare geometry name -> the materials that show them.
 
-use crate::load::mtl::{Finder, Materials, Place, Reading, plain_material};
+use crate::load::finder::{Finder, Place};
+use crate::load::mtl::{Materials, Reading, plain_material};
 use crate::load::paths::{FileFault, taken_from};
 use crate::load::texture::{Encoded, Unusable, decode_all};
 use crate::load::{Diagnostic, Loaded};
@@ -80,10 +81,8 @@ fn showing(name: &str, texture: u32) -> Material {
 /// # Errors
 /// The warning that it is not there.
 fn find(name: &str, place: &str, missed: &mut usize, reading: &mut Reading) -> Result<Place, Diagnostic> {
-    let mut finder = Finder { resolver: reading.resolver, missed: *missed };
-    let found = finder.find(name, &[Path::new("")]);
-    *missed = finder.missed;
-    let found = found.map_err(|fault| lost(&fault, place, reading.file))?;
+    let mut finder = Finder { resolver: reading.resolver, missed };
+    let found = finder.find(name, &[Path::new("")]).map_err(|fault| lost(&fault, place, reading.file))?;
     if found.guessed {
         let text = taken_from(name, &found.path);
         reading.warnings.push(Diagnostic::new("file-elsewhere", reading.file, place, text));

@@ -13,7 +13,7 @@ pub(super) use play::{Pose, play};
 pub(super) use posed::Originals;
 
 use super::accessor::{Format, Pick, Reader};
-use super::schema::{list, whole};
+use super::schema::{list, position};
 use crate::load::AnimationFacts;
 use curve::Interpolation;
 use gltf::json::Index;
@@ -241,8 +241,4 @@ fn target(root: &Value, target: &Value) -> Option<(Target, Numbers)> {
         Some(node) => Target::Node(position(node)?, property),
     };
     Some((target, property.numbers()))
-}
-
-fn position(value: &Value) -> Option<usize> {
-    whole(value).and_then(|i| usize::try_from(i).ok())
 }

@@ -316,3 +316,15 @@ fn normals_that_are_not_unit_are_made_so_with_one_warning() {
     assert_eq!(loaded.scene.meshes[0].normals, [Vec3::Z; 3]);
     assert_eq!(codes(&loaded), ["gltf-accessor-vector3-non-unit"]);
 }
+
+#[test]
+fn floats_that_are_called_normalized_are_read_as_they_are_and_told() {
+    let mut file = Builder::new();
+    let data: Vec<u8> =
+        [0.0_f32, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 3.0, 0.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let positions = file.accessor(&data, 5126, "VEC3", 3, true);
+    file.primitive(json!({"attributes": {"POSITION": positions}}));
+    let loaded = file.load();
+    assert_eq!(loaded.scene.meshes[0].positions, [Vec3::ZERO, Vec3::X * 2.0, Vec3::Y * 3.0]);
+    assert!(codes(&loaded).contains(&"gltf-accessor-normalized-invalid"), "{:?}", codes(&loaded));
+}

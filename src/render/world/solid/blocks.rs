@@ -160,7 +160,7 @@ mod tests {
             let texels: Vec<[u8; 4]> = (0..width * height).map(|_| [(); 4].map(|()| number(&mut random))).collect();
             let pixels = Pixels::Rgba8(texels.clone().into());
             let bitmap = Bitmap { name: String::new(), width: width as u32, height: height as u32, pixels };
-            for channel in 0..4 {
+            for channel in [0, 1, 2, ALPHA] {
                 let extremes = Extremes::of(&bitmap, channel).expect("it is there");
                 for range in [[0.5, 1.0], [0.1, 1.0], [0.0, 0.8], [0.0, 1.0], [0.79, 0.79]] {
                     let blocks = extremes.blocks(range);

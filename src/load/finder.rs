@@ -1,4 +1,4 @@
-//! Finds the files that OBJ and MTL texts name: libraries and pictures.
+//! Finds the files that models name: libraries of materials, pictures, buffers.
 //!
 //! Names come from other machines: with backslashes, with folders that were not shipped, in another case, and several
 //! on one line although names may hold spaces. A file found elsewhere than its name says costs a warning; everything is
@@ -8,10 +8,10 @@ use crate::load::paths::{FileFault, Found, Resolver, shown};
 use std::path::{Component, Path, PathBuf};
 
 /// Reads files by careless names.
-pub(in crate::load) struct Finder<'a> {
+pub(super) struct Finder<'a> {
     pub resolver: &'a mut Resolver,
-    /// Names that were not found anywhere.
-    pub missed: usize,
+    /// Names of the model that were not found anywhere.
+    pub missed: &'a mut usize,
 }
 
 /// After so many names that were not found anywhere others are looked for only where they say: each takes many looks into
@@ -20,7 +20,7 @@ const MISSES: usize = 256;
 
 /// Where a file is.
 #[derive(Debug)]
-pub(in crate::load) struct Place {
+pub(super) struct Place {
     /// Path relative to the model's folder, or absolute.
     pub path: PathBuf,
     /// The same for all names of one file.
@@ -31,7 +31,7 @@ pub(in crate::load) struct Place {
 
 impl Finder<'_> {
     /// Finds and reads `name`.
-    pub(in crate::load) fn read(&mut self, name: &str, folders: &[&Path]) -> Result<Found, FileFault> {
+    pub(super) fn read(&mut self, name: &str, folders: &[&Path]) -> Result<Found, FileFault> {
         let Place { path, guessed, .. } = self.find(name, folders)?;
         Ok(Found { bytes: self.resolver.read_file(&path)?, path, guessed })
     }
@@ -39,7 +39,7 @@ impl Finder<'_> {
     /// Finds `name`, looking in `folders` (relative to the model's), first as written, then in any case, then without its
     /// first folders, as written and in any case, then in folders that pictures are in, at last as a picture of another kind.
     /// The fault is that of the name as written.
-    pub(in crate::load) fn find(&mut self, name: &str, folders: &[&Path]) -> Result<Place, FileFault> {
+    pub(super) fn find(&mut self, name: &str, folders: &[&Path]) -> Result<Place, FileFault> {
         let slashed = name.replace('\\', "/");
         let mut fault = None;
         for folder in folders {
@@ -59,11 +59,11 @@ impl Finder<'_> {
     }
 
     fn elsewhere(&mut self, name: &str, folders: &[&Path]) -> Option<Place> {
-        if self.missed >= MISSES {
+        if *self.missed >= MISSES {
             return None;
         }
         let place = self.guess(name, folders);
-        self.missed += usize::from(place.is_none());
+        *self.missed += usize::from(place.is_none());
         place
     }
 
@@ -84,7 +84,7 @@ impl Finder<'_> {
     }
 
     /// Reads the libraries of one `mtllib` statement: one name with spaces, or several names.
-    pub(in crate::load) fn libraries(&mut self, names: &str) -> Vec<Result<Found, FileFault>> {
+    pub(super) fn libraries(&mut self, names: &str) -> Vec<Result<Found, FileFault>> {
         let here = [Path::new("")];
         let unescaped = names.replace("\\ ", " ");
         if let Ok(found) = self.as_written(unquote(&unescaped)) {
@@ -95,7 +95,7 @@ impl Finder<'_> {
         let mut out = Vec::new();
         let mut start = 0;
         while start < words.len() {
-            if self.missed >= MISSES {
+            if *self.missed >= MISSES {
                 out.push(Err(FileFault::Missing(shown(Path::new(&words[start..].join(" "))))));
                 break;
             }
@@ -181,7 +181,7 @@ fn words(names: &str) -> Vec<String> {
 }
 
 /// A name without the quotes around it.
-pub(in crate::load) fn unquote(name: &str) -> &str {
+pub(super) fn unquote(name: &str) -> &str {
     name.strip_prefix('"').and_then(|n| n.strip_suffix('"')).unwrap_or(name)
 }
 
@@ -200,7 +200,7 @@ mod tests {
         }
         let source = Source { path: dir.path().join("m.obj"), bytes: Vec::new() };
         let mut resolver = Resolver::new(&source, &LoadOptions::default());
-        run(&mut Finder { resolver: &mut resolver, missed: 0 })
+        run(&mut Finder { resolver: &mut resolver, missed: &mut 0 })
     }
 
     fn libraries(files: &[&str], names: &str) -> Vec<String> {
