@@ -184,11 +184,14 @@ pub struct Finding {
 
 impl Finding {
     fn of(usual: &Bill, without: Bill, Suspect { cause, evidence, remedy, .. }: Suspect) -> Self {
-        let rays = |bill: &Bill| bill.0.map(|work| work.rays);
+        /// One ray of so many is another where a place is rounded in another way.
+        const ROUNDED: u64 = 500;
+        let rays = usual.0.map(|work| work.rays);
         let keeps = cause.keeps_the_picture();
-        let cost: f64 = if keeps { without.cost_of(&rays(usual)) } else { without.sum().cost() as f64 };
+        let cost = if keeps { without.cost_of(&rays) } else { without.sum().cost() as f64 };
         let saving = 1.0 - cost / usual.sum().cost().max(1) as f64;
-        let is_drawn_anew = keeps && rays(&without) != rays(usual);
+        let others: u64 = rays.iter().zip(&without.0).map(|(rays, work)| rays.abs_diff(work.rays)).sum();
+        let is_drawn_anew = keeps && others * ROUNDED > usual.sum().rays;
         Self { cause, evidence, remedy, without, saving, is_drawn_anew }
     }
 

@@ -255,18 +255,23 @@ fn what_transforms_points_for_each_prim_costs_them_and_another_structure_saves_t
 #[test]
 fn a_saving_is_of_as_many_rays_and_small_ones_of_rays_that_were_drawn_anew_are_chance() {
     let work = |rays: u64, tests: u64| Work { rays, tests, ..Work::default() };
-    let usual = Bill([work(100, 1000), work(50, 500), Work::default(), Work::default()]);
+    let usual = Bill([work(1000, 10_000), work(500, 5000), Work::default(), Work::default()]);
     let found = |shadow: Work, cause: Cause| {
         let case = case(scene(vec![(ball(Vec3::ZERO, 1.0, 4), matt())]), AccelKind::Grid);
         let suspect = Suspect { cause, evidence: String::new(), remedy: String::new(), without: case };
-        Finding::of(&usual, Bill([work(100, 1000), shadow, Work::default(), Work::default()]), suspect)
+        Finding::of(&usual, Bill([work(1000, 10_000), shadow, Work::default(), Work::default()]), suspect)
     };
-    let alike = found(work(100, 1000), Cause::Shells);
+    let alike = found(work(1000, 10_000), Cause::Shells);
     assert!(alike.saving.abs() < 1e-12 && alike.is_drawn_anew && !alike.is_worth_it());
-    let cheaper = found(work(100, 880), Cause::Shells);
+    let cheaper = found(work(1000, 8800), Cause::Shells);
     assert!((cheaper.saving - 0.04).abs() < 1e-12 && !cheaper.is_worth_it(), "chance");
-    let same_rays = found(work(50, 440), Cause::Shells);
-    assert!((same_rays.saving - 0.04).abs() < 1e-12 && !same_rays.is_drawn_anew && same_rays.is_worth_it());
-    let fewer = found(work(25, 250), Cause::Lights);
+    for rays in [500, 501] {
+        let same_rays = found(work(rays, rays * 44 / 5), Cause::Shells);
+        assert!(
+            (same_rays.saving - 0.04).abs() < 1e-4 && !same_rays.is_drawn_anew && same_rays.is_worth_it(),
+            "{rays}"
+        );
+    }
+    let fewer = found(work(250, 2500), Cause::Lights);
     assert!((fewer.saving - 1.0 / 6.0).abs() < 1e-12 && !fewer.is_drawn_anew && fewer.is_worth_it());
 }

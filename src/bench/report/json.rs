@@ -13,14 +13,16 @@
 //! (null, or what it would choose: `kind`, `why`, and `won_time` and `won_nodes`: how much more the other fast
 //! structure costs in time and nodes, as a share of the chosen one's cost), `picture` (`width`, `height`, `samples`, `depth`,
 //! `view`, `camera`: world-space `eye`, unit `forward` and `up`, `half_height` of what is seen, at a distance of 1 or, where
-//! rays are `parallel`, anywhere), `rays` (by class: `asked`, `kept`), `identical` (whether all hits of the `compared` rays
-//! were, those that more than one structure got; null where there are none), `reference`, and `structures`. A structure has `accel`, `sampled`, `differing` (rays), `t_b` (seconds: `median`, `min`, `max`, `passes`, or null
+//! rays are `parallel`, anywhere), `rays` (by class: `asked`, `kept`), `compared` (rays that more than one structure got),
+//! `identical` (whether all their hits were; null where there are none), `reference`, and `structures`.
+//!
+//! A structure has `accel`, `sampled`, `differing` (rays), `t_b` (seconds: `median`, `min`, `max`, `passes`, or null
 //! without times), `t_tr` (seconds of a ray, or null), V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`, `bytes`,
 //! `break_even` (rays, or null), and `classes`. A class has exact sums (`rays`, `hits`, `tests`, `steps`, `cells`,
 //! `empty_cells`, `volume_tests`, `tests_saved`, `transforms`), `per_ray` (`n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`,
 //! `n_mb`, `n_xf`, `n_min`), `interval` (half the 95 % interval of each but `n_min`, or null when nothing was left out),
-//! `culled`, `differing`, `t_tr` (seconds of a ray, as `t_b`) and `mrays`. `kept_instances` have their triangles stored
-//! once. `left_out` names structures that could not bear so many prims: slow ones, or those that store each instance by
+//! `culled`, `differing`, `t_tr` (seconds of a ray, as `t_b`) and `mrays` (1 / `t_tr`). `kept_instances` have their triangles
+//! stored once. `left_out` names structures that could not bear so many prims: slow ones, or those that store each instance by
 //! itself. `pruning` is null, or seconds of processor time of rendering the picture as `usual` and with `everything` on
 //! (each as `t_b`), `saved` (a share) and `same` (whether the pixels were).
 //!
@@ -81,7 +83,8 @@ fn model(report: &Report, model: &Model) -> Value {
             "view": model.view, "camera": camera(&model.camera),
         },
         "rays": rays.collect::<Map<_, _>>(),
-        "identical": (model.compared() > 0).then(|| model.differing() == 0), "compared": model.compared(), "reference": model.reference().map(|k| k.name()),
+        "compared": model.compared(), "identical": (model.compared() > 0).then(|| model.differing() == 0),
+        "reference": model.reference().map(|k| k.name()),
         "structures": model.rows.iter().map(|row| structure(model, row)).collect::<Vec<_>>(),
         "best": report.plan.sweep.as_ref().map(|_| best(report, model)),
         "left_out": model.left_out.iter().map(|k| k.name()).collect::<Vec<_>>(),
