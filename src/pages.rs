@@ -23,8 +23,6 @@ use std::time::Duration;
 use bytemuck::Pod;
 use memmap2::MmapMut;
 
-use crate::stopwatch::Stopwatch;
-
 /// Bytes of a large page.
 const PAGE: usize = 1 << 21;
 
@@ -37,6 +35,7 @@ const DEAR: Duration = Duration::from_micros(1500);
 
 /// How many large pages of an array are made before it is written to, at most: every eighth, or fewer of a larger one. To make
 /// all of them takes longer, since they are out of the caches when they are written, and memory that is perhaps never used.
+#[cfg(target_os = "linux")]
 const TRIED: usize = 16;
 
 /// What dear pages may still take, nanoseconds of the processor.
@@ -82,6 +81,7 @@ impl Large {
     /// Room for so many bytes, if the system has large pages. One is dear that takes longer to be made than `dear`; behind the
     /// one that takes the last of the allowance, pages are small.
     fn new(bytes: usize, dear: Duration, allowance: &AtomicU64) -> Option<Self> {
+        use crate::stopwatch::Stopwatch;
         use memmap2::Advice;
         let whole = if bytes % PAGE >= WORTH_PAGE { bytes.checked_next_multiple_of(PAGE)? } else { bytes };
         // Nothing is ever written to what lies before the first large page and behind the last: it takes no memory.

@@ -59,6 +59,22 @@ fn the_worst_pixel_is_named_with_both_of_its_values() {
 }
 
 #[test]
+fn a_pixel_that_is_no_number_is_infinitely_wrong_also_as_it_is_displayed() {
+    let folder = folder().file("n.exr", bytes(&picture(f32::NAN), FileKind::Exr));
+    for space in ["linear", "display"] {
+        let run = folder.run(&["diff", "--json", "a.exr", "n.exr", "--space", space, "--fail-if", "max>1e9"]).ends(1);
+        let found: Value = serde_json::from_str(run.text()).unwrap();
+        assert_eq!(
+            (&found["max"], &found["pixels_over"], &found["flip"]["max"]),
+            (&Value::Null, &1.into(), &1.0.into())
+        );
+        let same = figures(&folder, &["n.exr", "n.exr", "--space", space]);
+        assert_eq!((&same["max"], &same["flip"]["max"]), (&0.0.into(), &0.0.into()));
+    }
+    folder.run(&["diff", "a.png", "n.exr", "--fail-if", "flip>0.5"]).ends(1);
+}
+
+#[test]
 fn two_exr_files_are_compared_in_linear_light_with_their_layers() {
     let folder = folder();
     let found = figures(&folder, &["a.exr", "b.exr"]);

@@ -30,6 +30,22 @@ fn a_ray_is_told_with_its_steps_its_hit_and_the_rays_behind_it() {
 }
 
 #[test]
+fn how_far_the_eye_is_behind_where_its_ray_starts_is_told() {
+    let folder = Folder::with_cube();
+    let of = |eye: &str| trace(&folder, &["--accel", "bvh", "--at", "0,0,0", "--fov", "5", "--eye", eye]);
+    let near = of("0,0,9");
+    assert_eq!(near["ray"]["skipped"], 0.0);
+    let far = of("0,0,900");
+    let z = |ray: &Value, t: f64| ray["origin"][2].as_f64().unwrap() + t * ray["direction"][2].as_f64().unwrap();
+    let [skipped, t] = [&far["ray"]["skipped"], &far["ray"]["hit"]["t"]].map(|number| number.as_f64().unwrap());
+    assert!(skipped > 800.0 && (z(&far["ray"], -skipped) - 900.0).abs() < 1e-3 && t < 50.0, "{skipped} {t}");
+    assert!((z(&far["ray"], t) - 1.0).abs() < 1e-3, "the front of the cube");
+    let words = ["trace", "cube.obj", "--size", "32x24", "--pixel", "16,12", "--at", "0,0,0", "--eye", "0,0,900"];
+    let text = folder.run(&words).ends(0);
+    assert!(text.text().contains("where t is 0: the eye is 8"), "{}", text.text());
+}
+
+#[test]
 fn every_structure_tells_the_same_hit_its_own_way() {
     let folder = Folder::with_cube();
     let names =
