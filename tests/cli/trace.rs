@@ -32,7 +32,7 @@ fn a_ray_is_told_with_its_steps_its_hit_and_the_rays_behind_it() {
 #[test]
 fn how_far_the_eye_is_behind_where_its_ray_starts_is_told() {
     let folder = Folder::with_cube();
-    let of = |eye: &str| trace(&folder, &["--accel", "bvh", "--at", "0,0,0", "--fov", "5", "--eye", eye]);
+    let of = |eye: &str| trace(&folder, &["--accel", "bvh", "--at", "0,0,0", "--fov", "0.5", "--eye", eye]);
     let near = of("0,0,9");
     assert_eq!(near["ray"]["skipped"], 0.0);
     let far = of("0,0,900");
