@@ -144,7 +144,10 @@ impl Told<'_> {
 }
 
 fn bill(bill: &Bill) -> Value {
-    let work = |w: &Work| json!({"rays": w.rays, "tests": w.tests, "steps": w.steps, "transforms": w.transforms, "cost": w.cost()});
+    let work = |w: &Work| {
+        let Work { rays, tests, steps, transforms } = w;
+        json!({"rays": rays, "tests": tests, "steps": steps, "transforms": transforms, "cost": w.cost()})
+    };
     let mut classes: Map<String, Value> =
         CLASS_NAMES.iter().zip(&bill.0).map(|(name, w)| ((*name).to_owned(), work(w))).collect();
     classes.insert("all".into(), work(&bill.sum()));

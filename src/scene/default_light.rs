@@ -37,26 +37,30 @@ const FILL_FROM: DVec3 = DVec3::new(0.85, 0.15, 0.55);
 /// unlit needs no lamps and gets the studio alone, to be seen before the same backdrop as others. The fill throws no
 /// shadows: it stands for light from all over that side.
 pub fn add_if_missing(scene: &mut Scene, camera: &Camera) -> DefaultLight {
+    let what = judged(scene);
+    if what == DefaultLight::Added {
+        scene.lights = vec![lamp("key", KEY, KEY_FROM, true, camera), lamp("fill", FILL, FILL_FROM, false, camera)];
+    }
+    if matches!(what, DefaultLight::Added | DefaultLight::NotNeeded) {
+        scene.environment = Environment::Studio;
+    }
+    what
+}
+
+/// What [`add_if_missing`] does to a scene.
+pub fn judged(scene: &Scene) -> DefaultLight {
     if scene.hints.default_light == Some(false) {
         return DefaultLight::NotWanted;
     }
-    if !is_missing(scene) {
+    let own_environment = !matches!(scene.environment, Environment::Black | Environment::Studio);
+    if !scene.lights.is_empty() || scene.ambient != Vec3::ZERO || own_environment {
         return DefaultLight::NotMissing;
     }
     let features = Features::of(scene);
     if features.has(Feature::Unlit) && !features.has(Feature::MetalRough) && !features.has(Feature::Phong) {
-        scene.environment = Environment::Studio;
         return DefaultLight::NotNeeded;
     }
-    scene.lights = vec![lamp("key", KEY, KEY_FROM, true, camera), lamp("fill", FILL, FILL_FROM, false, camera)];
-    scene.environment = Environment::Studio;
     DefaultLight::Added
-}
-
-/// Whether a scene has no light: no lamp, no ambient term and no environment of its own.
-pub fn is_missing(scene: &Scene) -> bool {
-    let own_environment = !matches!(scene.environment, Environment::Black | Environment::Studio);
-    scene.lights.is_empty() && scene.ambient == Vec3::ZERO && !own_environment
 }
 
 /// A directional light that comes from `from` in camera space.

@@ -7,7 +7,7 @@ use crate::load::{AnimationFacts, Loaded, WireFacts};
 use crate::math::{DVec3, Vec3};
 use crate::number::{bytes, grouped, hash, so_many};
 use crate::render::World;
-use crate::scene::default_light;
+use crate::scene::default_light::{self, DefaultLight};
 use crate::scene::features::Features;
 use crate::scene::framing::{Bounds, robust_bounds_within};
 use crate::scene::{Bitmap, LightKind, Mesh, Projection, Scene, UpAxis};
@@ -161,7 +161,7 @@ impl<'a> Report<'a> {
         lines.add("animations", shorten(self.loaded.facts.animations.iter().map(animation)));
         lines.add("cameras", shorten(scene.cameras.iter().map(|c| format!("{} ({})", label(&c.name), lens(c)))));
         lines.add("lights", shorten(scene.lights.iter().map(|l| format!("{} ({})", label(&l.name), kind(l)))));
-        if default_light::is_missing(scene) {
+        if default_light::judged(scene) == DefaultLight::Added {
             lines.add("lights", "none: pictures bring lamps and a studio, beside what is needed here");
         }
         if scene.ambient != Vec3::ZERO {
