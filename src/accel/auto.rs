@@ -114,58 +114,72 @@ impl Named for AccelChoice {
     }
 }
 
-/// Why a structure was chosen. Without a sample all numbers but that of prims are 0.
+/// What was chosen, and why.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reason {
     /// What was chosen.
     pub kind: AccelKind,
-    /// Rays of the sample.
-    pub rays: u64,
-    /// Triangles and other prims that the sample was traced through; without one, all.
+    /// Triangles and other prims that were judged: those of a sample, else all.
     pub prims: usize,
-    /// How many eye rays are too few for a sample, where that is why there is none.
-    pub few_rays: Option<u64>,
-    /// Cost of a ray through `fast-octree`, in nodes.
+    /// What it was chosen by.
+    pub why: Why,
+}
+
+/// What a structure is chosen by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Why {
+    /// Both structures are the same tree.
+    OneTree,
+    /// There are too few prims for a sample.
+    FewPrims,
+    /// So many eye rays are too few for one.
+    FewRays(u64),
+    /// There is no surface from which rays of a sample could start.
+    NoSurface,
+    /// A sample.
+    Sample(Sample),
+}
+
+/// What rays of a sample cost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// How many there were.
+    pub rays: usize,
+    /// Cost of one through `fast-octree`, in nodes.
     pub octree: f64,
-    /// Cost of a ray through `fast-bvh`, in nodes.
+    /// Cost of one through `fast-bvh`, in nodes.
     pub bvh: f64,
 }
 
 impl Reason {
-    /// Whether both structures are the same tree.
-    pub fn is_one_tree(&self) -> bool {
-        self.rays == 0 && self.prims <= ALIKE
+    /// What rays of a sample cost, where there was one.
+    pub fn sample(&self) -> Option<Sample> {
+        if let Why::Sample(sample) = self.why { Some(sample) } else { None }
     }
 }
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { kind, rays, prims, few_rays, octree, bvh } = *self;
-        if self.is_one_tree() {
-            return write!(f, "{kind}: {prims} shapes, and up to {ALIKE} are cut alike by fast-octree and fast-bvh");
-        }
-        if let Some(few) = few_rays {
-            return write!(
+        let Self { kind, prims, why } = *self;
+        write!(f, "{kind}: ")?;
+        match why {
+            Why::OneTree => write!(f, "{prims} shapes, and up to {ALIKE} are cut alike by fast-octree and fast-bvh"),
+            Why::FewPrims => {
+                let fewest = SHARE * FEWEST;
+                write!(f, "{prims} shapes, and with fewer than {fewest} a sample would take longer than it may save")
+            }
+            Why::FewRays(rays) => write!(
                 f,
-                "{kind}: {prims} shapes, and for what begins with {few} eye rays a sample would take longer than it may save"
-            );
-        }
-        let fewest = SHARE * FEWEST;
-        if rays == 0 && prims >= fewest as usize {
-            return write!(f, "{kind}: {prims} shapes without an area from which rays of a sample could start");
-        }
-        if rays == 0 {
-            return write!(
+                "{prims} shapes, and for what begins with {rays} eye rays a sample would take longer than it may save"
+            ),
+            Why::NoSurface => write!(f, "{prims} shapes without an area from which rays of a sample could start"),
+            Why::Sample(Sample { rays, octree, bvh }) => write!(
                 f,
-                "{kind}: {prims} shapes, and with fewer than {fewest} a sample would take longer than it may save"
-            );
+                "{rays} rays through a sample of {prims} shapes cost {octree:.1} nodes each with fast-octree, {bvh:.1} with \
+                 fast-bvh, which must save {:.1} %, more than chance in such a sample",
+                WORTH * 100.0
+            ),
         }
-        write!(
-            f,
-            "{kind}: {rays} rays through a sample of {prims} shapes cost {octree:.1} nodes each with fast-octree, {bvh:.1} with \
-             fast-bvh, which must save {:.1} %, more than chance in such a sample",
-            WORTH * 100.0
-        )
     }
 }
 
@@ -220,11 +234,16 @@ pub fn reason(shapes: &Shapes, kept: &Kept, eye_rays: u64) -> Reason {
 fn judge(shapes: &Shapes, eye_rays: u64) -> Reason {
     let bounded = shapes.bounded();
     let judged = (bounded / SHARE).min(MOST);
-    let few_rays = (judged >= FEWEST && eye_rays < RAYS_A_PRIM * u64::from(judged)).then_some(eye_rays);
-    let starts = if judged < FEWEST || few_rays.is_some() { Vec::new() } else { over_surface(shapes, RAYS) };
+    let without = |why| Reason { kind: AccelKind::FastOctree, prims: bounded as usize, why };
+    if judged < FEWEST {
+        return without(if bounded as usize <= ALIKE { Why::OneTree } else { Why::FewPrims });
+    }
+    if eye_rays < RAYS_A_PRIM * u64::from(judged) {
+        return without(Why::FewRays(eye_rays));
+    }
+    let starts = over_surface(shapes, RAYS);
     if starts.is_empty() {
-        let (kind, prims) = (AccelKind::FastOctree, bounded as usize);
-        return Reason { kind, rays: 0, prims, few_rays, octree: 0.0, bvh: 0.0 };
+        return without(Why::NoSurface);
     }
     let rays = sample(shapes, &starts);
     let count = (judged / PART).max(1);
@@ -240,7 +259,7 @@ fn judge(shapes: &Shapes, eye_rays: u64) -> Reason {
     let costs: Vec<(f64, f64, usize)> = (0..count).into_par_iter().map(of_part).collect();
     let (octree, bvh, prims) = costs.iter().fold((0.0, 0.0, 0), |(o, b, n), of| (o + of.0, b + of.1, n + of.2));
     let kind = if bvh < octree * (1.0 - WORTH) { AccelKind::FastBvh } else { AccelKind::FastOctree };
-    Reason { kind, rays: rays.len() as u64, prims, few_rays: None, octree, bvh }
+    Reason { kind, prims, why: Why::Sample(Sample { rays: rays.len(), octree, bvh }) }
 }
 
 /// Of one ray, in nodes.
@@ -416,14 +435,15 @@ mod tests {
         let large = [("clumps", clumps(2000)), ("star", scenes::star(300, 150)), ("copies", scenes::copies(40_000))];
         for (name, shapes) in large {
             let reason = chosen(&shapes);
-            assert!(reason.rays > 0 && reason.prims < shapes.len(), "{name}: {reason}");
-            let saves = reason.bvh < reason.octree * (1.0 - WORTH);
+            let Some(Sample { octree, bvh, .. }) = reason.sample() else { panic!("{name}: {reason}") };
+            assert!(reason.prims < shapes.len(), "{name}: {reason}");
+            let saves = bvh < octree * (1.0 - WORTH);
             let better = if saves { AccelKind::FastBvh } else { AccelKind::FastOctree };
             assert_eq!(reason.kind, better, "{name}: {reason}");
             match name {
                 "clumps" => assert_eq!(reason.kind, AccelKind::FastBvh, "{reason}"),
                 // Nothing parts copies: both are the same tree.
-                "copies" => assert_eq!(reason.octree, reason.bvh, "{reason}"),
+                "copies" => assert_eq!(octree, bvh, "{reason}"),
                 _ => {}
             }
         }
@@ -433,7 +453,7 @@ mod tests {
     fn scenes_that_are_not_large_get_the_octree_without_a_sample() {
         for (name, shapes) in scenes::all() {
             let reason = chosen(&shapes);
-            assert_eq!((reason.kind, reason.rays), (AccelKind::FastOctree, 0), "{name}: {reason}");
+            assert_eq!((reason.kind, reason.sample()), (AccelKind::FastOctree, None), "{name}: {reason}");
         }
         let why = |each| chosen(&clumps(each)).to_string();
         let clumps = clumps(2000);
@@ -441,8 +461,8 @@ mod tests {
         let judged = u64::from(clumps.bounded() / SHARE);
         let (few, enough) = (for_rays(RAYS_A_PRIM * judged - 1), for_rays(RAYS_A_PRIM * judged));
         assert_eq!(
-            (few.kind, few.rays, enough.kind),
-            (AccelKind::FastOctree, 0, AccelKind::FastBvh),
+            (few.kind, few.why, enough.kind),
+            (AccelKind::FastOctree, Why::FewRays(RAYS_A_PRIM * judged - 1), AccelKind::FastBvh),
             "{few}, {enough}"
         );
         assert!(few.to_string().contains(&format!("begins with {} eye rays", RAYS_A_PRIM * judged - 1)), "{few}");
@@ -492,7 +512,7 @@ mod tests {
     #[test]
     fn a_scene_without_bounded_shapes_is_no_trouble() {
         let shapes = Shapes { planes: vec![(Vec3::Y, 0.0)], opaque: BitSet::filled(1, true), ..Shapes::default() };
-        assert_eq!(chosen(&shapes).rays, 0);
+        assert_eq!(chosen(&shapes).why, Why::OneTree);
     }
 
     #[test]
@@ -501,6 +521,6 @@ mod tests {
         let along = (0..count + 2).map(|i| Vec3::X * i as f32).collect();
         let shapes = scenes::mesh(along, (0..count).map(|i| [i, i + 1, i + 2]).collect());
         let reason = chosen(&shapes);
-        assert!(reason.rays == 0 && reason.to_string().contains("without an area"), "{reason}");
+        assert!(reason.why == Why::NoSurface && reason.to_string().contains("without an area"), "{reason}");
     }
 }

@@ -3,14 +3,14 @@
 use super::args::GenerateArgs;
 use super::exit::Exit;
 use super::interrupt;
-use super::message::Messages;
+use super::message::{Messages, Severity};
 use super::writable::{self, Sources};
 use crate::generate::{Family, triangles};
 use crate::load::Diagnostic;
 use crate::number::grouped;
 use crate::save::{glb, obj};
 use crate::scene::Scene;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Makes the scene and writes it.
 pub(super) fn run(args: &GenerateArgs) -> Exit {
@@ -40,7 +40,8 @@ pub(super) fn run(args: &GenerateArgs) -> Exit {
     let written = write(&scene).and_then(|bytes| interrupt::write_atomic(&path, &bytes).map_err(|e| e.to_string()));
     match written {
         Ok(()) => {
-            messages.info("generated", summary(args.family, &path, &scene));
+            let summary = summary(args.family, &scene);
+            messages.say(Severity::Info, &Diagnostic::new("generated", path, "", summary));
             Exit::Done
         }
         Err(text) => messages.unwritable(&path, &text),
@@ -57,11 +58,7 @@ fn as_obj(scene: &Scene) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-fn summary(family: Family, path: &Path, scene: &Scene) -> String {
+fn summary(family: Family, scene: &Scene) -> String {
     let (count, instances) = (grouped(triangles(scene) as u64), scene.instances.len());
-    format!(
-        "{}: {family}, {count} triangles in {instances} {}",
-        path.display(),
-        if instances == 1 { "object" } else { "objects" }
-    )
+    format!("{family}, {count} triangles in {instances} {}", if instances == 1 { "object" } else { "objects" })
 }

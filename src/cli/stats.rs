@@ -183,9 +183,9 @@ impl PictureStats {
             "width": settings.width, "height": settings.height, "samples": samples, "sampling": sampling, "depth": making.depth,
             "cutoff": sampling::plain(settings.cutoff), "seed": settings.seed, "view": view, "accel": making.accel.name(),
             "intersector": making.job.intersector.name(),
-            "auto": making.reason.map(|r| json!({
-                "why": r.to_string(), "rays": r.rays, "prims": r.prims,
-                "fast-octree": (r.rays > 0).then_some(r.octree), "fast-bvh": (r.rays > 0).then_some(r.bvh),
+            "auto": making.reason.map(|r| (r, r.sample())).map(|(r, sample)| json!({
+                "why": r.to_string(), "rays": sample.map_or(0, |s| s.rays), "prims": r.prims,
+                "fast-octree": sample.map(|s| s.octree), "fast-bvh": sample.map(|s| s.bvh),
             })),
             "animation": summary::shown(&making.loaded.facts).map(|(number, time)| json!({ "number": number, "time": time })),
             "parameters": parameters(making.accel, &making.job.params),

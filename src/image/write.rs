@@ -35,23 +35,13 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_and_rename(&target, &folder, old, bytes)
 }
 
-/// Whether [`write_atomic`] may make its file in the folder of `path`, as far as the system says before it does. Where what is
-/// there already is written straight, it is not made.
+/// Whether [`write_atomic`] can make its file in the folder of `path`: one is made and goes at once. Where what is there
+/// already is written straight, none is needed.
 pub fn folder_takes(path: &Path) -> bool {
     let target = destination(path);
     let is_written_straight = descriptor(path).is_some() || fs::metadata(&target).is_ok_and(|old| !old.is_file());
-    is_written_straight || takes_files(&folder_of(&target))
-}
-
-#[cfg(unix)]
-fn takes_files(folder: &Path) -> bool {
-    use nix::unistd::{AccessFlags, access};
-    access(folder, AccessFlags::W_OK | AccessFlags::X_OK).is_ok()
-}
-
-#[cfg(not(unix))]
-fn takes_files(_: &Path) -> bool {
-    true
+    // Permissions do not say it all: some file systems take no files from anybody. Where it can be, the file has no name.
+    is_written_straight || tempfile::tempfile_in(folder_of(&target)).is_ok()
 }
 
 fn write_and_rename(target: &Path, folder: &Path, old: Option<Permissions>, bytes: &[u8]) -> io::Result<()> {
@@ -217,8 +207,15 @@ mod tests {
             // Some users may all the same.
             let takes = write_atomic(&picture, b"x").map_err(|e| e.to_string());
             assert_eq!(folder_takes(&picture), takes.is_ok());
+            assert_eq!(names(dir.path()).len(), usize::from(takes.is_ok()), "nothing is left of asking");
             assert!(takes.is_ok() || takes.is_err_and(|text| text.ends_with("permission denied")));
             fs::set_permissions(dir.path(), Permissions::from_mode(0o755)).unwrap();
+        }
+
+        #[cfg(target_os = "linux")]
+        #[test]
+        fn a_file_system_that_takes_no_files_from_anybody_is_known_before() {
+            assert!(!folder_takes(Path::new("/proc/a.png")));
         }
 
         #[test]

@@ -236,6 +236,20 @@ pub const PLACED_SCALE: f64 = (1u64 << 24) as f64;
 /// How far rounding may move corners, in parts of the object's size: more than this, and boxes would cull little.
 pub const PLACED_ROOM: f32 = 1.0 / 1024.0;
 
+/// How far apart two ways to find the texture coordinates at which a ray meets a face may be, both in `f32`: from the weights
+/// of the hit, and from the face's plane n·x = c and the gradients of the coordinates along it. In parts of P G ℓ + Q: P =
+/// |o| + |t d| + |c|, G the growth of a coordinate by length at most, ℓ = |d|/|n·d|, and Q the sizes of the
+/// coordinates at corners and place, of what is added to them, and of G times the corners.
+///
+/// *Plane.* n·o errs by 4 u √3 |o| with the rounding of n, the difference to c by 9 u |o| + 2 u |c|, and n·d by 4 u ℓ in
+/// parts of itself: along the ray the place is off by less than ℓ u (9 |o| + 2 |c| + 6 |t d|), and by 2 u (|o| + |t d|) when
+/// it is computed from t. Gradients, their three products and three sums add 7 u G (2 |o| + |t d|), and the coordinates at
+/// the origin, Q of size, 2 u Q: together less than 25 u P G ℓ + 2 u Q.
+///
+/// *Weights.* Two are correctly rounded, the third errs by 2 u; three products and three sums: 8 u Q. A length of texels
+/// adds u Q. What is left of 64 is for what rounds these sizes themselves.
+pub const FACE_COORDINATE: f32 = 64.0 * U32;
+
 /// How far from the edges of its face a secondary ray starts, in units of the error of its position.
 ///
 /// [`offset_origin`] leaves the face by at most 3 errors. A face that rises from the edge at an angle α is at that

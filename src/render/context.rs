@@ -19,7 +19,7 @@ use crate::accel::shapes::Prim;
 use crate::math::Vec3;
 use crate::math::simd::LANES;
 use crate::scene::features::{Feature, Features};
-use crate::scene::{AlphaMode, Background, Material, Scene};
+use crate::scene::{Background, Material, Scene};
 use std::sync::Arc;
 
 /// Rays to a panorama from each point, when nobody says.
@@ -263,15 +263,6 @@ fn auto_depth(features: &Features, rough_ones_mirror: bool, cutoff: f32) -> u32 
     }
 }
 
-/// Whether the material is there at all where its opacity is `opacity`, and how much of it is seen.
-pub(crate) fn coverage(material: &Material, opacity: f32) -> f32 {
-    match material.alpha_mode {
-        AlphaMode::Opaque => 1.0,
-        AlphaMode::Mask { cutoff } => f32::from(u8::from(opacity >= cutoff)),
-        AlphaMode::Blend => opacity.clamp(0.0, 1.0),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -324,14 +315,5 @@ mod tests {
         assert_eq!(shared(16, 4), [4, 4, 6, 4, 8]);
         assert_eq!(shared(4, 4), [2, 4, 6, 4, 8]);
         assert_eq!(shared(100, 4), [25; 5]);
-    }
-
-    #[test]
-    fn opacity_covers_as_the_alpha_mode_says() {
-        let with = |alpha_mode| Material { alpha_mode, ..Material::plain() };
-        assert_eq!(coverage(&with(AlphaMode::Opaque), 0.2), 1.0);
-        assert_eq!(coverage(&with(AlphaMode::Mask { cutoff: 0.5 }), 0.5), 1.0);
-        assert_eq!(coverage(&with(AlphaMode::Mask { cutoff: 0.5 }), 0.49), 0.0);
-        assert_eq!(coverage(&with(AlphaMode::Blend), 0.2), 0.2);
     }
 }

@@ -1,6 +1,5 @@
 //! How much of a picture shows something, as rays spread over it tell.
 
-use super::context;
 use super::eyes::{Ball, Eye, Place};
 use super::shade::Reader;
 use super::surface::{Surface, Target};
@@ -102,5 +101,5 @@ fn is_there(job: &Job, ray: &Ray, hit: &Hit) -> bool {
     let surface = Surface::new(job.world, target, ray, hit, 0.0);
     let reader = Reader { store: job.textures, patch: surface.patch.as_ref(), known: &[] };
     (surface.front || material.double_sided || material.reflection.transmits())
-        && context::coverage(material, reader.base(material).w) > 0.0
+        && material.alpha_mode.covers(reader.base(material).w) > 0.0
 }

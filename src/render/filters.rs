@@ -6,7 +6,7 @@
 
 use super::Settings;
 use super::absorption::Absorption;
-use super::context::{Context, coverage};
+use super::context::Context;
 use super::optics::transmittance;
 use super::seam::is_same_crossing;
 use super::shade::{Reader, has_inside, shadow_filter};
@@ -203,7 +203,7 @@ fn left_behind(context: &Context, target: &Target, hit: &Hit) -> Option<f32> {
     if target.material.reflection.transmits() {
         return None;
     }
-    Some(1.0 - coverage(target.material, target.opacity(hit, context.textures)?))
+    Some(1.0 - target.material.alpha_mode.covers(target.opacity(hit, context.textures)?))
 }
 
 /// What the surface at `hit` lets through. Maps are read at full sharpness: the shadow's own distance is unknown here.

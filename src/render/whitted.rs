@@ -13,7 +13,7 @@ use super::beside::Beside;
 use super::branch::{Ground, Point};
 use super::by_class::ByClass;
 use super::clearings::Cones;
-use super::context::{AROUND_LIMIT, Context, FOLLOWERS, SHADOW_LIMIT, coverage};
+use super::context::{AROUND_LIMIT, Context, FOLLOWERS, SHADOW_LIMIT};
 use super::draws::{Draws, Purpose, Stream};
 use super::everything::look_up_in_vain;
 use super::eyes::{Asks, Eyes};
@@ -235,7 +235,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
         let reader = Reader { store: context.textures, patch: surface.patch.as_ref(), known: &[] };
         let base = reader.base(material);
-        let covered = coverage(material, base.w);
+        let covered = material.alpha_mode.covers(base.w);
         if covered <= 0.0 {
             return self.continuing[class as usize].push(*ray, *before, *hit);
         }

@@ -143,6 +143,18 @@ pub enum AlphaMode {
     Blend,
 }
 
+impl AlphaMode {
+    /// How much of a surface is seen, from 0 (it is not there) to 1, where its opacity is `opacity`.
+    #[inline]
+    pub fn covers(self, opacity: f32) -> f32 {
+        match self {
+            Self::Opaque => 1.0,
+            Self::Mask { cutoff } => f32::from(u8::from(opacity >= cutoff)),
+            Self::Blend => opacity.clamp(0.0, 1.0),
+        }
+    }
+}
+
 /// Which texture, through which coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureRef {
@@ -419,5 +431,18 @@ impl Reflection {
             Self::Phong(p) => Self::Phong(Phong { transmission: Vec3::ZERO, dispersion: 0.0, ..p }),
             Self::Unlit => Self::Unlit,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn opacity_covers_as_the_alpha_mode_says() {
+        assert_eq!(AlphaMode::Opaque.covers(0.2), 1.0);
+        assert_eq!(AlphaMode::Mask { cutoff: 0.5 }.covers(0.5), 1.0);
+        assert_eq!(AlphaMode::Mask { cutoff: 0.5 }.covers(0.49), 0.0);
+        assert_eq!(AlphaMode::Blend.covers(0.2), 0.2);
     }
 }

@@ -70,6 +70,7 @@ fn sizes_that_make_no_sense_are_bad_command_lines() {
     folder.run(&["bench", "--generate", "tetra", "--sizes", "1e3..1e8"]).ends(2).says(&["1e7"]);
     folder.run(&["bench", "cube.obj", "--sizes", "1e3"]).ends(2).says(&["--sizes"]);
     folder.run(&["bench", "cube.obj", "--generate", "tetra"]).ends(2);
+    folder.run(&["bench", "--generate", "tetra", "--scene", "0"]).ends(2).says(&["--scene"]);
     folder.run(&["bench"]).ends(2);
 }
 

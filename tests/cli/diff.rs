@@ -100,7 +100,7 @@ fn a_layer_that_differs_or_that_one_file_has_alone_is_told_and_can_be_limited() 
         folder
             .run(&[&["diff"], &pair[..], &["--fail-if", "layer-max>1e9"]].concat())
             .ends(1)
-            .says(&["layer-max is inf"]);
+            .says(&["layer-max is infinite"]);
     }
 }
 

@@ -38,3 +38,12 @@ fn what_cannot_be_generated_is_a_bad_command_line() {
     }
     assert!(folder.names().is_empty());
 }
+
+#[test]
+fn what_was_written_is_named_apart_for_programs() {
+    let folder = Folder::new();
+    let run = folder.run(&["generate", "tetra", "--size", "64", "-o", "a.obj", "--messages", "json"]).ends(0);
+    let message: serde_json::Value = serde_json::from_str(&run.stderr).unwrap();
+    assert_eq!((&message["code"], &message["file"]), (&"generated".into(), &"a.obj".into()));
+    assert_eq!(message["text"], "tetra, 64 triangles in 1 object");
+}

@@ -26,6 +26,7 @@ fn a_folder_without_the_scenes_is_an_error_that_names_them() {
     let folder = Folder::with_cube();
     folder.run(&["bench", "--spd", "."]).ends(3).says(&["holds none of balls.nff"]);
     folder.run(&["bench", "cube.obj", "--spd", "."]).ends(2);
+    folder.run(&["bench", "--spd", ".", "--size", "64x48"]).ends(2).says(&["--size"]);
     folder
         .file("tetra.nff", "f 1 1 1 1 0 0 0 0\np 3\n0 0 0\n1 0 0\n0 1 0\n")
         .run(&["bench", "--spd", "."])

@@ -5,7 +5,7 @@ use std::iter;
 use super::table::Table;
 use super::{Model, Report};
 use crate::accel::AccelKind;
-use crate::accel::auto::nodes;
+use crate::accel::auto::{Why, nodes};
 use crate::bench::row::Row;
 use crate::number::grouped;
 
@@ -106,7 +106,7 @@ pub fn sentences(report: &Report, model: &Model) -> Vec<String> {
     let Some(reason) = model.auto else { return Vec::new() };
     let outcome = match Outcome::of(report, model) {
         Some(outcome) => Some(outcome.sentence()),
-        None if reason.is_one_tree() => None,
+        None if reason.why == Why::OneTree => None,
         None => Some("Whether that is right was not measured: it takes both fast-octree and fast-bvh".into()),
     };
     iter::once(format!("auto would choose {reason}")).chain(outcome).collect()

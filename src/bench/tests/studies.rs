@@ -134,7 +134,7 @@ fn what_auto_would_choose_is_held_against_the_rays() {
     }
     report.models[0].rows.pop();
     assert_eq!(auto_sentences(&report, &report.models[0]).len(), 1, "in one tree there is nothing to be measured");
-    report.models[0].auto.as_mut().unwrap().rays = 64;
+    report.models[0].auto.as_mut().unwrap().why = auto::Why::FewPrims;
     let said = auto_sentences(&report, &report.models[0]);
     assert!(said[1].contains("not measured"), "{said:?}");
 }

@@ -10,6 +10,50 @@ use crate::generate::Family;
 use clap::{ArgAction, Args};
 use std::path::PathBuf;
 
+/// Flags that say how files are loaded; scenes made in memory are as they are.
+const OF_FILES: [&str; 13] = [
+    "up",
+    "scene",
+    "variant",
+    "animation",
+    "time",
+    "frame",
+    "fps",
+    "polygons",
+    "smooth",
+    "line_width",
+    "mtl",
+    "root",
+    "max_memory",
+];
+
+/// Flags of rays, structures and passes; those that published figures ask for are known.
+const OF_RUNS: [&str; 23] = [
+    "sizes",
+    "accel",
+    "grid_density",
+    "grid_resolution",
+    "max_depth",
+    "step_cost",
+    "leaf_size",
+    "grid_cells",
+    "max_references",
+    "assign",
+    "mailbox",
+    "size",
+    "samples",
+    "depth",
+    "view",
+    "camera",
+    "eye",
+    "at",
+    "rays",
+    "passes",
+    "threads",
+    "heatmap_max",
+    "compare",
+];
+
 /// What `meshray bench` was given.
 #[derive(Debug, Clone, Args)]
 pub(in crate::cli) struct BenchArgs {
@@ -24,7 +68,7 @@ pub(in crate::cli) struct BenchArgs {
     pub messages: MessageFormat,
 
     /// Measure how cost grows, on scenes of this family in the --sizes given, made in memory
-    #[arg(long, value_name = "NAME", value_parser = parse::named::<Family>(), conflicts_with = "inputs",
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<Family>(), conflicts_with = "inputs", conflicts_with_all = OF_FILES,
           help_heading = "Growth")]
     pub generate: Option<Family>,
     /// Triangles of the scenes, each made as near as its family can: a list 1e3,1e4, a range by tens 1e3..1e6 (with its
@@ -39,8 +83,9 @@ pub(in crate::cli) struct BenchArgs {
     #[arg(long, value_name = "NAME=VALUES", conflicts_with_all = ["generate", "baseline"], help_heading = "Structure")]
     pub sweep: Option<Sweep>,
     /// Count on the NFF files of this folder what was published of the Standard Procedural Databases in 1999, and put both
-    /// side by side: rays, grids, octrees. Of the other flags --slow-tests (of a structure), --seed and --report count
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["inputs", "generate", "sweep", "baseline", "accel"],
+    /// side by side: rays, grids, octrees. With it go --slow-tests (of a structure), --seed and --report
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["inputs", "generate", "sweep", "baseline"],
+          conflicts_with_all = OF_FILES.iter().filter(|flag| **flag != "max_memory"), conflicts_with_all = OF_RUNS,
           help_heading = "Published figures")]
     pub spd: Option<PathBuf>,
 
@@ -104,4 +149,31 @@ pub(in crate::cli) struct BenchArgs {
     /// Only the tables, warnings and errors
     #[arg(short, long, help_heading = "Run")]
     pub quiet: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::args::Cli;
+    use clap::CommandFactory;
+
+    #[test]
+    fn no_flag_that_changes_nothing_can_be_typed_beside_generate_or_spd() {
+        const OF_ALL: [&str; 6] = ["messages", "seed", "simd", "slow-tests", "report", "quiet"];
+        let command = Cli::command();
+        let bench = command.find_subcommand("bench").unwrap();
+        let of_files = |heading: &str| ["Loading", "Animation"].contains(&heading);
+        for (mode, more) in [("generate", &[][..]), ("spd", &["max-memory"])] {
+            let mode = bench.get_arguments().find(|a| a.get_id() == mode).unwrap();
+            let refuses = |one, other| bench.get_arg_conflicts_with(one).contains(&other);
+            for flag in bench.get_opts().filter(|flag| *flag != mode) {
+                let (name, heading) = (flag.get_long().unwrap(), flag.get_help_heading().unwrap_or_default());
+                let is_used = OF_ALL.contains(&name) || more.contains(&name);
+                // What belongs to a baseline needs one.
+                let is_used = is_used || name == "fail-if" || mode.get_id() == "generate" && !of_files(heading);
+                let is_refused = refuses(mode, flag) || refuses(flag, mode);
+                assert!(is_refused || is_used, "--{name} beside --{}", mode.get_id());
+                assert!(!(is_refused && OF_ALL.contains(&name)), "--{name} beside --{}", mode.get_id());
+            }
+        }
+    }
 }

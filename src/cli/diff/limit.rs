@@ -54,7 +54,8 @@ impl Limit {
     pub(super) fn broken_by(&self, compared: &Compared) -> Option<String> {
         let value = (self.figure.1)(compared);
         let kept = if self.above { value <= self.bound } else { value >= self.bound };
-        (!kept).then(|| format!("{} is {value}, which is beyond the limit {self}", self.figure.0))
+        let told = if value.is_infinite() { "infinite".into() } else { value.to_string() };
+        (!kept).then(|| format!("{} is {told}, which is beyond the limit {self}", self.figure.0))
     }
 }
 

@@ -1,12 +1,12 @@
 //! The bytes that buffers and buffer views stand for.
 
 use super::codes::Code;
-use super::elsewhere;
 use super::meshopt::{self, Decoded};
+use super::named::{Reader, Unread};
 use super::report::Report;
 use crate::load::Diagnostic;
 use crate::load::limits::{Budget, OverBudget};
-use crate::load::paths::{FileFault, Resolver, shorten, taken_from};
+use crate::load::paths::{FileFault, Resolver, shorten};
 use base64::Engine as _;
 use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
@@ -44,7 +44,8 @@ impl<'a> Buffers<'a> {
     ) -> Self {
         let mut buffers = Self { root, slots: Vec::with_capacity(root.buffers.len()), decoded: Decoded::new() };
         let mut known: HashMap<&str, usize> = HashMap::new();
-        let mut find = Find { bin, file, resolver, budget, report, missed: 0 };
+        let files = Reader { file, resolver, missed: 0 };
+        let mut find = Find { bin, files, budget, report };
         let stand_ins = stand_ins(root);
         for (i, buffer) in root.buffers.iter().enumerate() {
             let named = buffer.uri.as_deref().filter(|uri| !is_data(uri));
@@ -167,12 +168,9 @@ fn clamp(wanted: u64, end: usize) -> usize {
 /// Where the bytes of buffers are looked for.
 struct Find<'a, 'b> {
     bin: Option<&'a [u8]>,
-    file: &'b Path,
-    resolver: &'b mut Resolver,
+    files: Reader<'b>,
     budget: &'b mut Budget,
     report: &'b mut Report,
-    /// Names that were found nowhere.
-    missed: usize,
 }
 
 impl<'a> Find<'a, '_> {
@@ -189,7 +187,7 @@ impl<'a> Find<'a, '_> {
     /// A buffer whose bytes nobody has asked for.
     fn nowhere(&self, i: usize) -> Slot<'a> {
         let text = "nothing says where its bytes are; what needs them is left out";
-        Slot::Nowhere(Diagnostic::new("gltf-buffer-nowhere", self.file, format!("buffers[{i}]"), text))
+        Slot::Nowhere(Diagnostic::new("gltf-buffer-nowhere", self.files.file, format!("buffers[{i}]"), text))
     }
 
     fn data(&mut self, uri: &str, place: &str) -> Slot<'a> {
@@ -207,45 +205,21 @@ impl<'a> Find<'a, '_> {
             Err(why) => {
                 let text = format!("'{}' is no data URI: {why}", shorten(uri));
                 self.report.add(Code::InvalidUri, place, text.clone());
-                Slot::Failed(Diagnostic::new(Code::InvalidUri.name(), self.file, place, text))
+                Slot::Failed(Diagnostic::new(Code::InvalidUri.name(), self.files.file, place, text))
             }
         }
     }
 
     fn named(&mut self, uri: &str, place: &str) -> Slot<'a> {
-        match self.resolver.read_uri_within(uri, self.budget) {
-            Ok(Ok(found)) => {
-                found.note(uri, self.file, place).into_iter().for_each(|note| self.report.warnings.push(note));
-                Slot::Bytes(Cow::Owned(found.bytes))
-            }
-            Ok(Err(over)) => self.too_large(place, over),
-            Err(why) => match elsewhere::find(uri, &why, self.resolver, &mut self.missed) {
-                Some(path) => {
-                    if elsewhere::is_near(uri, &why) {
-                        self.report.warnings.push(why.diagnose(self.file, place));
-                    }
-                    self.named_elsewhere(uri, &path, place)
-                }
-                None => self.failed(&why, place),
-            },
-        }
-    }
-
-    /// The bytes of a buffer that lies where its name does not lead to.
-    fn named_elsewhere(&mut self, uri: &str, path: &Path, place: &str) -> Slot<'a> {
-        match self.resolver.read_file_within(path, self.budget) {
-            Ok(Ok(bytes)) => {
-                let text = taken_from(uri, path);
-                self.report.warnings.push(Diagnostic::new("file-elsewhere", self.file, place, text));
-                Slot::Bytes(Cow::Owned(bytes))
-            }
-            Ok(Err(over)) => self.too_large(place, over),
-            Err(why) => self.failed(&why, place),
+        match self.files.read(uri, place, self.budget, &mut self.report.warnings) {
+            Ok(bytes) => Slot::Bytes(Cow::Owned(bytes)),
+            Err(Unread::TooLarge(over)) => self.too_large(place, over),
+            Err(Unread::Fault(why)) => self.failed(&why, place),
         }
     }
 
     fn failed(&mut self, why: &FileFault, place: &str) -> Slot<'a> {
-        let fault = why.diagnose(self.file, place);
+        let fault = why.diagnose(self.files.file, place);
         match why {
             FileFault::BadUri(_) => self.report.add(Code::InvalidUri, &fault.place, fault.text.clone()),
             _ => self.report.warnings.push(fault.clone()),
@@ -254,7 +228,7 @@ impl<'a> Find<'a, '_> {
     }
 
     fn too_large(&mut self, place: &str, over: OverBudget) -> Slot<'a> {
-        let fault = Diagnostic::over_memory(self.file, place, format!("the buffer is too large: {over}"));
+        let fault = Diagnostic::over_memory(self.files.file, place, format!("the buffer is too large: {over}"));
         self.report.warnings.push(fault.clone());
         Slot::Failed(fault)
     }

@@ -2,13 +2,13 @@
 
 use super::buffers::{Buffers, decode_data, is_data, media_type};
 use super::codes::Code;
-use super::elsewhere;
 use super::gloss;
+use super::named::{Reader, Unread};
 use super::report::Report;
 use super::schema::position;
 use super::textures::Picture;
 use crate::load::limits::{Budget, Limits, OverBudget};
-use crate::load::paths::{Resolver, taken_from};
+use crate::load::paths::Resolver;
 use crate::load::texture::{Encoded, Unusable, decode_all, format_of, take_memory};
 use crate::load::{Diagnostic, ktx};
 use crate::scene::{Bitmap, Pixels};
@@ -40,7 +40,7 @@ impl<'a> Images<'a> {
         let mut images = Self { bytes: Vec::new(), same: HashMap::new() };
         let drawn: HashSet<usize> = drawn.iter().map(|picture| picture.image).collect();
         let mut known: HashMap<&str, usize> = HashMap::new();
-        let mut missed = 0;
+        let mut find = Find { buffers, files: Reader { file, resolver, missed: 0 }, budget, report };
         for (i, image) in root.images.iter().enumerate() {
             let named = image.uri.as_deref().filter(|uri| !is_data(uri));
             let drawn = drawn.contains(&i);
@@ -48,13 +48,12 @@ impl<'a> Images<'a> {
                 images.same.insert(i, other);
                 images.bytes.push(None);
             } else {
-                let mut find = Find { buffers, file, resolver, budget, report, drawn, missed: &mut missed };
-                images.bytes.push(find.bytes(i, image));
+                images.bytes.push(find.bytes(i, image, drawn));
                 // What was looked for once is not looked for again, found or not.
                 known.extend(named.filter(|_| is_wanted(image, drawn)).map(|uri| (uri, i)));
             }
             if let Some(bytes) = images.of(i) {
-                check_kind(root, i, image, bytes, report);
+                check_kind(root, i, image, bytes, find.report);
             }
         }
         check_textures(root, &images, report);
@@ -119,23 +118,19 @@ fn charge(bitmap: &Bitmap, limits: &Limits, budget: &mut Budget) -> Result<(), U
 /// Where the bytes of one image are looked for.
 struct Find<'a, 'b> {
     buffers: &'a Buffers<'a>,
-    file: &'b Path,
-    resolver: &'b mut Resolver,
+    files: Reader<'b>,
     budget: &'b mut Budget,
     report: &'b mut Report,
-    drawn: bool,
-    /// Names that were found nowhere.
-    missed: &'b mut usize,
 }
 
 impl<'a> Find<'a, '_> {
-    fn bytes(&mut self, i: usize, image: &Image) -> Option<Cow<'a, [u8]>> {
+    fn bytes(&mut self, i: usize, image: &Image, drawn: bool) -> Option<Cow<'a, [u8]>> {
         match (&image.uri, image.buffer_view) {
             (Some(uri), _) if is_data(uri) => self.data(i, uri).map(Cow::Owned),
-            (Some(uri), _) if is_wanted(image, self.drawn) => self.named(i, uri).map(Cow::Owned),
+            (Some(uri), _) if is_wanted(image, drawn) => self.named(i, uri).map(Cow::Owned),
             (None, Some(view)) => {
                 let bytes = self.buffers.view(view).ok().map(Cow::Borrowed);
-                if bytes.is_none() && self.drawn {
+                if bytes.is_none() && drawn {
                     self.report.add(Code::ImageDataInvalid, format!("images[{i}]"), "its bytes are not there");
                 }
                 bytes
@@ -146,33 +141,12 @@ impl<'a> Find<'a, '_> {
 
     fn named(&mut self, i: usize, uri: &str) -> Option<Vec<u8>> {
         let place = format!("images[{i}].uri");
-        match self.resolver.read_uri_within(uri, self.budget) {
-            Ok(Ok(found)) => {
-                found.note(uri, self.file, &place).into_iter().for_each(|note| self.report.warnings.push(note));
-                Some(found.bytes)
-            }
-            Ok(Err(over)) => {
-                self.leave_out(i, over);
-                None
-            }
-            Err(why) => {
-                let found = elsewhere::find(uri, &why, self.resolver, self.missed);
-                if found.is_none() || elsewhere::is_near(uri, &why) {
-                    self.report.warnings.push(why.diagnose(self.file, &place));
-                }
-                let path = found?;
-                match self.resolver.read_file_within(&path, self.budget) {
-                    Ok(Ok(bytes)) => {
-                        let text = taken_from(uri, &path);
-                        self.report.warnings.push(Diagnostic::new("file-elsewhere", self.file, &place, text));
-                        return Some(bytes);
-                    }
-                    Ok(Err(over)) => self.leave_out(i, over),
-                    Err(why) => self.report.warnings.push(why.diagnose(self.file, &place)),
-                }
-                None
-            }
+        match self.files.read(uri, &place, self.budget, &mut self.report.warnings) {
+            Ok(bytes) => return Some(bytes),
+            Err(Unread::TooLarge(over)) => self.leave_out(i, over),
+            Err(Unread::Fault(why)) => self.report.warnings.push(why.diagnose(self.files.file, &place)),
         }
+        None
     }
 
     /// Whether so many bytes may still be taken; else the image is left out with a warning.
@@ -184,7 +158,7 @@ impl<'a> Find<'a, '_> {
 
     fn leave_out(&mut self, i: usize, over: OverBudget) {
         let text = format!("the image is too large: {over}");
-        self.report.warnings.push(Diagnostic::over_memory(self.file, format!("images[{i}]"), text));
+        self.report.warnings.push(Diagnostic::over_memory(self.files.file, format!("images[{i}]"), text));
     }
 
     fn data(&mut self, i: usize, uri: &str) -> Option<Vec<u8>> {

@@ -30,7 +30,6 @@ mod draco_points;
 mod draco_stream;
 #[cfg(feature = "draco")]
 mod draco_survey;
-mod elsewhere;
 mod extensions;
 mod faces;
 mod gloss;
@@ -42,6 +41,7 @@ mod mend;
 mod mesh;
 mod meshopt;
 mod meshopt_codec;
+mod named;
 mod palette;
 mod placed;
 mod report;

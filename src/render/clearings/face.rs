@@ -1,6 +1,7 @@
 //! A cut-out face, and where rays meet it: in one line of memory.
 
 use crate::accel::Ray;
+use crate::math::bounds::FACE_COORDINATE;
 use crate::math::simd::{Kernel, LANES, Simd};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 use crate::render::texture::Survey;
@@ -10,14 +11,11 @@ use bytemuck::{Pod, Zeroable};
 /// roundings.
 const GRAZING: f32 = 50.0;
 
-/// Error of a place on a face that a ray meets under a right angle, in parts of the largest number it is made from; more
-/// than all roundings.
-const ROUNDING: f32 = 4e-6;
-
-/// A triangle is left out of which two edges' lengths, multiplied, are more than this many times twice its area.
+/// A triangle is left out of which two edges' lengths, multiplied, are more than this many times twice its area: so normal and
+/// gradients, computed in `f64`, are right to far more than the digits that are kept.
 const SLENDER: f64 = 500.0;
 
-/// Error of coordinates, texels, beside that.
+/// Error of coordinates, texels, beside that of [`FACE_COORDINATE`]: what a lookup rounds of places between texels.
 const BLUR: f32 = 0.05;
 
 /// It is seen from its front alone.
@@ -59,7 +57,6 @@ impl Face {
         let (e1, e2) = (b - a, c - a);
         let normal = e1.cross(e2);
         let twice = normal.length();
-        // Of slivers rounding makes too much.
         if e1.length() * e2.length() > twice * SLENDER {
             return None;
         }
@@ -83,7 +80,7 @@ impl Face {
             growth: narrow(growth),
             map: 0,
             flags: 0,
-            error: narrow(error) * ROUNDING,
+            error: narrow(error) * FACE_COORDINATE,
         };
         let is_known = face.growth > 0.0 && (face.growth + face.error + face.place).is_finite();
         (is_known && face.at.is_finite() && face.normal.is_finite()).then_some(face)
@@ -111,7 +108,7 @@ impl Face {
             let [width, spread] = [rays.cone[0][i], rays.cone[1][i]];
             let largest = origin.abs().max_element() + t.abs() * length + self.place.abs();
             let largest_at = at[0][i].abs().max(at[1][i].abs());
-            let error = BLUR + self.error + (largest * self.growth * longer + largest_at) * ROUNDING;
+            let error = BLUR + self.error + (largest * self.growth * longer + largest_at) * FACE_COORDINATE;
             let across = (width + spread * t) * growth;
             let reach = map.reach(across, across * longer) + error;
             // Backs of one-sided faces are passed, too, but as something that is there.

@@ -2,7 +2,6 @@ use super::*;
 use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, NO_PRIM, NoProbe};
 use crate::math::random::Random;
 use crate::math::{DAffine3, DVec3, Vec3};
-use crate::render::context::coverage;
 use crate::render::shade::Reader;
 use crate::render::surface::{Surface, Target};
 use crate::scene::{
@@ -164,13 +163,13 @@ fn what_is_said_to_be_a_gap_is_shaded_as_nothing_and_what_is_said_to_stop_light_
                 assert!(surface.front || target.material.double_sided, "its back is crossed: {}", what());
                 assert!(hit.t > from, "it may be met once more: {}", what());
                 let reader = Reader { store: &textures, patch: surface.patch.as_ref(), known: &[] };
-                let covered = coverage(target.material, reader.base(target.material).w);
+                let covered = target.material.alpha_mode.covers(reader.base(target.material).w);
                 assert!(covered <= 0.0, "{covered} of it is there: {}", what());
                 assert!(!target.material.reflection.transmits(), "{}", what());
                 gaps += 1;
             }
             if let Some(stops) = clearings.stops(&ray, prim) {
-                let covered = target.opacity(&hit, &textures).map(|opacity| coverage(target.material, opacity));
+                let covered = target.opacity(&hit, &textures).map(|opacity| target.material.alpha_mode.covers(opacity));
                 assert_eq!(covered, Some(f32::from(u8::from(stops))), "{}", what());
                 said[usize::from(stops)] += 1;
             }

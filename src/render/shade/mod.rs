@@ -27,7 +27,6 @@ pub(crate) use phong::{PhongMatter, PhongPaint};
 pub(crate) use sheen::SheenMatter;
 pub(crate) use spectrum::{Band, bands};
 
-use super::context::coverage;
 use super::footing::Footing;
 use super::optics::reflect;
 use super::patch::Patch;
@@ -499,7 +498,7 @@ pub(crate) fn occlusion(material: &Material, shade: f32) -> f32 {
 /// An absent texel lets everything through, one of a see-through material what its opacity and its colour leave.
 pub(crate) fn shadow_filter(material: &Material, reader: &Reader) -> Vec3 {
     let base = reader.base(material);
-    let solid = coverage(material, base.w);
+    let solid = material.alpha_mode.covers(base.w);
     let passed = match &material.reflection {
         Reflection::Unlit => Vec3::ZERO,
         Reflection::Phong(m) => m.transmission,

@@ -1,7 +1,7 @@
 //! What all points of a material have in common.
 
 use super::sheet::Sheet;
-use crate::render::context::{Gloss, coverage};
+use crate::render::context::Gloss;
 use crate::render::shade::{Matter, Model, has_inside};
 use crate::render::texture::TextureStore;
 use crate::scene::{Material, MetalRough};
@@ -81,7 +81,7 @@ impl Common {
             material: number,
             shiny: glass || lobes.is_some() || smooth || matter.has_narrow_highlight() || bounces && mirrors,
             one_sided: !material.double_sided && !glass,
-            covered: coverage(material, material.opacity),
+            covered: material.alpha_mode.covers(material.opacity),
             mapped: material.textures().next().is_some(),
             sheet: Sheet::of(material, store),
             glass: glass.then(|| Glass::of(material, &matter)),

@@ -9,7 +9,7 @@ use super::common::Common;
 use crate::accel::NO_PRIM;
 use crate::math::Vec3;
 use crate::render::beside::Traced;
-use crate::render::context::{Context, coverage};
+use crate::render::context::Context;
 use crate::render::patch::Patch;
 use crate::render::shade::{
     Matter, MetalRoughMatter, MetalRoughPaint, Model, PhongMatter, PhongPaint, Reader, blurred, is_narrow,
@@ -217,7 +217,7 @@ impl Strip {
     fn read_at(&mut self, i: usize, context: &Context, material: &Material, patch: &Patch, widens: bool) {
         let reader = Reader { store: context.textures, patch: Some(patch), known: &[] };
         let base = reader.base(material);
-        self.painted.covered[i] = coverage(material, base.w);
+        self.painted.covered[i] = material.alpha_mode.covers(base.w);
         if self.painted.covered[i] <= 0.0 {
             return;
         }

@@ -6,7 +6,7 @@ use super::cones::Cones;
 use super::painted::Painted;
 use crate::math::simd::{Kernel, Simd};
 use crate::math::{Vec2, Vec3, Vec4};
-use crate::render::context::{Context, coverage};
+use crate::render::context::Context;
 use crate::render::patch::{FrameTurn, Turn, given_tangent, mixed_color, turned_by_texel, turning_of};
 use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, base_space, has_inside, is_cut_out, occlusion};
 use crate::render::surface::{facing, side_of};
@@ -411,7 +411,7 @@ fn spread(
 #[inline(always)]
 fn paint(painted: &mut Painted, i: usize, (material, vertex): (&Material, Vec4), texel: impl Fn(Slot) -> Vec4) {
     let base = base_color(material, texel(Slot::Base), texel(Slot::Opacity).x, vertex);
-    painted.covered[i] = coverage(material, base.w);
+    painted.covered[i] = material.alpha_mode.covers(base.w);
     let base = base.truncate();
     painted.put_emission(i, material.emission * texel(Slot::Emission).truncate());
     painted.put_normal_texel(i, texel(Slot::Normal).truncate());

@@ -463,7 +463,7 @@ fn the_opacity_that_shadow_rays_read_is_that_of_a_point_that_is_seen() {
             let patch = target.patch(&world, u, v, Vec3::ZERO);
             let reader = Reader { store: &store, patch: patch.as_ref(), known: &[] };
             let opacity = target.opacity(&hit, &store).expect("a triangle");
-            let filter = Vec3::splat(1.0 - crate::render::context::coverage(target.material, opacity));
+            let filter = Vec3::splat(1.0 - target.material.alpha_mode.covers(opacity));
             assert_eq!(filter, shadow_filter(target.material, &reader), "round {round}");
             seen += usize::from(filter.x > 0.0 && filter.x < 1.0);
         }

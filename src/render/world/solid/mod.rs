@@ -155,7 +155,6 @@ mod tests {
     use super::*;
     use crate::math::random::Random;
     use crate::math::{Vec2, Vec3};
-    use crate::render::context::coverage;
     use crate::render::texture::TextureStore;
     use crate::scene::{Bitmap, Filter, MetalRough, Phong, Pixels, Reflection, Sampler, Texture, UvTransform};
 
@@ -238,7 +237,11 @@ mod tests {
                     let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
                     let (uv, _) = coordinates_at(mesh, corners, [1.0 - u - v, u, v], &map).expect("coordinates");
                     let opacity = material.opacity * store.channel::<3>(map.texture, uv);
-                    assert_eq!(coverage(material, opacity), 1.0, "round {round}, triangle {i}: {opacity} at {uv}");
+                    assert_eq!(
+                        material.alpha_mode.covers(opacity),
+                        1.0,
+                        "round {round}, triangle {i}: {opacity} at {uv}"
+                    );
                 }
             }
         }
