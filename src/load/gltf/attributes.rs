@@ -22,16 +22,15 @@ const FLOAT: u64 = 5126;
 const ARRAY_BUFFER: u64 = 34962;
 const ELEMENT_ARRAY_BUFFER: u64 = 34963;
 
-/// Checks every primitive, with the material that it shows in a variant; `played` says that an animation is.
-pub(super) fn check(root: &Value, variant: Option<usize>, played: bool, report: &mut Report) {
+/// Checks every primitive, with the material that it shows in a variant.
+pub(super) fn check(root: &Value, variant: Option<usize>, report: &mut Report) {
     let quantized = list(root, "extensionsUsed").iter().any(|e| e == "KHR_mesh_quantization");
-    let weighted = weighted(root, played);
-    let mut check = Check { root, variant, quantized, weighted, views: HashMap::new(), maps: HashMap::new(), report };
+    let mut check = Check { root, variant, quantized, views: HashMap::new(), maps: HashMap::new(), report };
     for (i, mesh) in list(root, "meshes").iter().enumerate() {
         let targets: Vec<usize> = list(mesh, "primitives").iter().map(|p| list(p, "targets").len()).collect();
         for (k, primitive) in list(mesh, "primitives").iter().enumerate() {
             let place = format!("meshes[{i}].primitives[{k}]");
-            check.primitive(primitive, i, &place);
+            check.primitive(primitive, &place);
             if targets[k] != targets[0] {
                 let text = format!("{} morph targets, but the first primitive has {}", targets[k], targets[0]);
                 check.report.add(Code::MeshPrimitivesUnequalTargetsCount, place, text);
@@ -69,8 +68,6 @@ struct Check<'a> {
     /// The variant of materials that is asked for.
     variant: Option<usize>,
     quantized: bool,
-    /// Which morph targets of each mesh have a weight.
-    weighted: Vec<Vec<bool>>,
     /// The attribute that came first in each buffer view.
     views: HashMap<usize, u64>,
     /// What the maps of each material need, as far as somebody asked.
@@ -79,7 +76,7 @@ struct Check<'a> {
 }
 
 impl<'a> Check<'a> {
-    fn primitive(&mut self, primitive: &'a Value, mesh: usize, place: &str) {
+    fn primitive(&mut self, primitive: &'a Value, place: &str) {
         let empty = Map::new();
         let attributes = primitive.get("attributes").and_then(Value::as_object).unwrap_or(&empty);
         let at = format!("{place}.attributes");
@@ -116,9 +113,6 @@ impl<'a> Check<'a> {
         for (k, target) in list(primitive, "targets").iter().enumerate() {
             let place = format!("{place}.targets[{k}]");
             self.target(target, attributes, vertices, &place);
-            if self.weighted[mesh].get(k) == Some(&true) {
-                self.unmoved(target, attributes, &place);
-            }
         }
         self.material(primitive, attributes, place);
     }
@@ -264,16 +258,6 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Tells of attributes that a target with a weight changes in vain.
-    fn unmoved(&mut self, target: &Value, base: &Map<String, Value>, place: &str) {
-        let is_unmoved = |name: &str| name.starts_with("TEXCOORD_") || name.starts_with("COLOR_");
-        let names = target.as_object().into_iter().flat_map(Map::keys);
-        for name in names.filter(|name| is_semantic(name) && is_unmoved(name) && base.contains_key(*name)) {
-            let text = format!("morphing of {name} is not drawn");
-            self.report.note("gltf-morph-unsupported", format!("{place}.{name}"), text, "it stays as it is");
-        }
-    }
-
     /// Whether the primitive has what its material's maps need.
     fn material(&mut self, primitive: &Value, attributes: &Map<String, Value>, place: &str) {
         let place = format!("{place}.material");
@@ -364,26 +348,6 @@ fn fit(name: &str, shape: &Shape, morph: bool) -> Fit {
         (true, false, true) => Fit::Quantized,
         _ => Fit::No,
     }
-}
-
-/// Which morph targets of each mesh have a weight: of its own, of a node that shows it, or in an animation that is played.
-fn weighted(root: &Value, played: bool) -> Vec<Vec<bool>> {
-    let weights = |value: &Value| list(value, "weights").iter().map(|w| w.as_f64() != Some(0.0)).collect::<Vec<_>>();
-    let mut all: Vec<Vec<bool>> = list(root, "meshes").iter().map(weights).collect();
-    let shown = |node: &Value| node.get("mesh").and_then(position);
-    for node in list(root, "nodes") {
-        let Some(own) = shown(node).and_then(|mesh| all.get_mut(mesh)) else { continue };
-        let more = weights(node);
-        own.resize(own.len().max(more.len()), false);
-        own.iter_mut().zip(more).for_each(|(own, more)| *own |= more);
-    }
-    let mut channels = list(root, "animations").iter().flat_map(|animation| list(animation, "channels"));
-    if played && channels.any(|channel| channel.pointer("/target/path").is_some_and(|path| path == "weights")) {
-        let targets = |mesh: &Value| list(mesh, "primitives").iter().map(|p| list(p, "targets").len()).max();
-        let meshes = list(root, "meshes").iter().map(|mesh| targets(mesh).unwrap_or(0));
-        all.iter_mut().zip(meshes).for_each(|(own, targets)| *own = vec![true; targets]);
-    }
-    all
 }
 
 /// The maps of a material by their texture coordinates.

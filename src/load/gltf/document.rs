@@ -5,6 +5,7 @@
 
 use super::animation::{self, Animation, Originals};
 use super::codes::Code;
+use super::morphs::Morphs;
 use super::report::Report;
 use super::schema;
 use super::weight::{DEEPEST, Weight};
@@ -21,6 +22,7 @@ pub(super) struct Document {
     pub(super) animations: Vec<Animation>,
     /// What pointers of animations change.
     pub(super) originals: Originals,
+    pub(super) morphs: Morphs,
 }
 
 /// Refuses JSON that is nested deeper than the parser goes.
@@ -77,9 +79,9 @@ pub(super) fn typed(mut value: Value, bytes: u64, report: &mut Report) -> Option
     let cameras = map.get_mut("cameras").and_then(Value::as_array_mut).into_iter().flatten();
     let is_camera = |camera: &Value| Camera::deserialize(camera).is_ok();
     cameras.filter(|camera| !is_camera(camera)).for_each(|camera| *camera = json!({"type": "perspective"}));
-    let originals = Originals::of(&value, &animations);
+    let (originals, morphs) = (Originals::of(&value, &animations), Morphs::of(&value));
     match serde_json::from_value(value) {
-        Ok(root) => Some(Document { root, bytes, animations, originals }),
+        Ok(root) => Some(Document { root, bytes, animations, originals, morphs }),
         Err(e) => {
             report.refuse(Code::TypeMismatch, "", format!("the JSON is not glTF 2.0: {e}"));
             None

@@ -3,6 +3,7 @@
 use super::accessor::{Format, Pick, Reader, Unreadable};
 use super::codes::Code;
 use super::faces::{self, Dropped};
+use super::morphs::Change;
 use super::report::Report;
 use super::skin::{self, Influences, Skin};
 use crate::load::tangents;
@@ -12,6 +13,7 @@ use gltf::json::Index;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf::json::validation::Checked;
+use std::ops::AddAssign;
 
 /// What to read and how.
 pub(super) struct Job<'a> {
@@ -21,6 +23,8 @@ pub(super) struct Job<'a> {
     pub(super) name: &'a str,
     /// Weights of the morph targets; missing ones are zero.
     pub(super) weights: &'a [f32],
+    /// What these change of colours and texture coordinates, target by target.
+    pub(super) changes: &'a [Change],
     pub(super) skin: Option<&'a Skin>,
     pub(super) needs: Needs,
     /// Whether anything of it is drawn; if not it is read only to be checked.
@@ -81,7 +85,8 @@ pub(super) fn cost(reader: Reader, job: &Job) -> u64 {
     let corners = primitive.indices.map_or(vertices, |index| reader.count(index));
     let used = vertices.min(corners);
     let targets = primitive.targets.iter().flatten().enumerate().filter(|(k, _)| job.reads_target(*k));
-    let morphs = targets.flat_map(|(_, t)| [t.positions, t.normals, t.tangents].into_iter().flatten()).count() as u64;
+    let morphs = targets.flat_map(|(_, t)| [t.positions, t.normals, t.tangents].into_iter().flatten()).count();
+    let morphs = (morphs + job.changes.iter().filter(|change| job.reads_target(change.target)).count()) as u64;
     let values = primitive.attributes.len() as u64;
     let faces = match primitive.mode {
         // Nearly every corner starts a face of three.
@@ -282,8 +287,11 @@ impl Task<'_, '_> {
                 changed |= self.job.weight(k) != 0.0;
             }
         }
-        // Sums with unit vectors are no longer unit, once all is added; that is no fault of the file.
+        // Sums with unit vectors are no longer unit, once all is added, nor are those of colours what colours are; that is no
+        // fault of the file.
         if changed {
+            faces::clamp_colors(&mut mesh.colors);
+            mesh.uvs.iter_mut().for_each(|uvs| _ = faces::finite_uvs(uvs));
             mesh.normals.iter_mut().for_each(|n| *n = n.try_normalize().unwrap_or(*n));
             let unit = |t: &mut Vec4| *t = t.truncate().try_normalize().map_or(*t, |d| d.extend(t.w));
             mesh.tangents.iter_mut().for_each(unit);
@@ -291,34 +299,56 @@ impl Task<'_, '_> {
     }
 
     fn add_target(&mut self, mesh: &mut Mesh, target: &MorphTarget, k: usize, weight: f32) {
-        let count = mesh.positions.len();
-        let parts = [(target.positions, "POSITION"), (target.normals, "NORMAL"), (target.tangents, "TANGENT")];
-        for (index, name) in parts {
-            let semantic = if name == "POSITION" { Semantic::Positions } else { Semantic::Normals };
-            let readable = |index: &Index<Accessor>| {
-                let format = self.reader.root.accessors.get(index.value()).and_then(Format::of);
-                format.is_some_and(|format| is_readable(&semantic, format))
-            };
-            let Some(index) = index.filter(readable) else { continue };
-            let part = format!("targets[{k}].{name}");
-            let (has, vertices) = (self.reader.count(index), self.vertices);
-            if has != vertices {
-                // Of others it was told when the JSON was checked.
-                if self.reader.decoded.indices(self.indices()).is_some() {
-                    let place = self.place(&part);
-                    let text = format!("{has} elements for {vertices} vertices");
-                    self.report.add(Code::MeshPrimitiveMorphTargetInvalidAttributeCount, place, text);
-                }
+        let parts = [
+            (target.positions, Semantic::Positions),
+            (target.normals, Semantic::Normals),
+            (target.tangents, Semantic::Tangents),
+        ];
+        let parts = parts.into_iter().filter_map(|(accessor, attribute)| Some((accessor?, attribute)));
+        let of_target = self.job.changes.partition_point(|change| change.target < k);
+        let changes = self.job.changes[of_target..].iter().take_while(|change| change.target == k);
+        for (index, attribute) in parts.chain(changes.map(|change| (change.accessor, change.attribute.clone()))) {
+            let part = format!("targets[{k}].{}", attribute.to_string());
+            if !self.is_change(index, &attribute, &part) {
                 continue;
             }
-            let Some(deltas) = self.floats::<3>(index, &part).filter(|d| d.len() == count) else { continue };
-            let deltas = deltas.into_iter().map(|d| Vec3::from(d) * weight);
-            match name {
-                "POSITION" => mesh.positions.iter_mut().zip(deltas).for_each(|(p, d)| *p += d),
-                "NORMAL" => mesh.normals.iter_mut().zip(deltas).for_each(|(n, d)| *n += d),
-                _ => mesh.tangents.iter_mut().zip(deltas).for_each(|(t, d)| *t += d.extend(0.0)),
+            match attribute {
+                Semantic::Positions => {
+                    add(&mut mesh.positions, self.floats(index, &part), |d| Vec3::from_array(d) * weight);
+                }
+                Semantic::Normals => {
+                    add(&mut mesh.normals, self.floats(index, &part), |d| Vec3::from_array(d) * weight);
+                }
+                Semantic::Tangents => {
+                    let change = |d| (Vec3::from_array(d) * weight).extend(0.0);
+                    add(&mut mesh.tangents, self.floats(index, &part), change);
+                }
+                // Of three numbers the fourth, alpha's, is zero.
+                Semantic::Colors(_) => {
+                    add(&mut mesh.colors, self.floats(index, &part), |d| Vec4::from_array(d) * weight);
+                }
+                Semantic::TexCoords(set) => {
+                    let uvs = mesh.uvs.get_mut(set as usize).map_or(&mut [][..], Vec::as_mut_slice);
+                    add(uvs, self.floats(index, &part), |d| Vec2::from_array(d) * weight);
+                }
+                Semantic::Joints(_) | Semantic::Weights(_) | Semantic::Extras(_) => {}
             }
         }
+    }
+
+    /// Whether an accessor of a morph target can be read and has a value for each vertex.
+    fn is_change(&mut self, index: Index<Accessor>, attribute: &Semantic, part: &str) -> bool {
+        let format = self.reader.root.accessors.get(index.value()).and_then(Format::of);
+        if !format.is_some_and(|format| can_change(attribute, format)) {
+            return false;
+        }
+        let (has, vertices) = (self.reader.count(index), self.vertices);
+        // Of others it was told when the JSON was checked.
+        if has != vertices && self.reader.decoded.indices(self.indices()).is_some() {
+            let (place, text) = (self.place(part), format!("{has} elements for {vertices} vertices"));
+            self.report.add(Code::MeshPrimitiveMorphTargetInvalidAttributeCount, place, text);
+        }
+        has == vertices
     }
 
     /// Places a skinned mesh by its joints.
@@ -376,6 +406,12 @@ impl Task<'_, '_> {
     }
 }
 
+/// Adds what a morph target changes to what is there, if both are there.
+fn add<T: AddAssign, const N: usize>(to: &mut [T], changes: Option<Vec<[f32; N]>>, change: impl Fn([f32; N]) -> T) {
+    let changes = changes.filter(|changes| changes.len() == to.len()).into_iter().flatten();
+    to.iter_mut().zip(changes).for_each(|(value, by)| *value += change(by));
+}
+
 fn is_unsigned(component: ComponentType) -> bool {
     matches!(component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
 }
@@ -395,5 +431,18 @@ fn is_readable(semantic: &Semantic, format: Format) -> bool {
         Semantic::Joints(_) => format.shape == Type::Vec4 && unsigned && small,
         Semantic::Weights(_) => format.shape == Type::Vec4 && (float || (format.normalized && unsigned && small)),
         Semantic::Extras(_) => false,
+    }
+}
+
+/// The same for what a morph target changes of it: colours may become less, and tangents have no handedness.
+fn can_change(attribute: &Semantic, format: Format) -> bool {
+    let small = format.component != ComponentType::U32;
+    match attribute {
+        Semantic::Tangents => is_readable(&Semantic::Normals, format),
+        Semantic::Colors(_) => {
+            let is_color = matches!(format.shape, Type::Vec3 | Type::Vec4);
+            is_color && (format.component == ComponentType::F32 || (format.normalized && small))
+        }
+        _ => is_readable(attribute, format),
     }
 }

@@ -41,6 +41,7 @@ mod mend;
 mod mesh;
 mod meshopt;
 mod meshopt_codec;
+mod morphs;
 mod named;
 mod palette;
 mod placed;
@@ -132,7 +133,7 @@ impl Loading<'_> {
         self.take(budget, bytes, "the document")?;
         let variants = variants::names(&value);
         let variant = self.variant(&variants)?;
-        attributes::check(&value, variant, self.options.moment.is_some(), self.report);
+        attributes::check(&value, variant, self.report);
         usage::check(&value, self.report);
         let mut graph = Graph::new(&value, self.report);
         let document = document::typed(value, bytes, self.report);
@@ -188,7 +189,7 @@ impl Loading<'_> {
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
         let skins = skin::load(reader, graph, &placed.variants, self.report);
         skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
-        let palette = Palette::new(root, &placed, facts.variant, self.options.smooth.is_some());
+        let palette = Palette::new(root, &document.morphs, &placed, facts.variant, self.options.smooth.is_some());
         for texture in &palette.textures.without_image {
             let text = "the texture names no image that is read, and is not drawn";
             self.report.warnings.push(Diagnostic::new("texture-no-image", file, format!("textures[{texture}]"), text));

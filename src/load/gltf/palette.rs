@@ -2,6 +2,7 @@
 
 use super::material;
 use super::mesh::{Job, Needs};
+use super::morphs::Morphs;
 use super::scene::{Placed, Variant};
 use super::skin::Skin;
 use super::textures::Textures;
@@ -21,11 +22,18 @@ pub(super) struct Palette<'a> {
     /// For each material of the file, and last for the default one, its index here.
     index: Vec<Option<u32>>,
     pub(super) textures: Textures<'a>,
+    morphs: &'a Morphs,
 }
 
 impl<'a> Palette<'a> {
     /// Converts the materials that drawn primitives name.
-    pub(super) fn new(root: &'a Root, placed: &Placed, variant: Option<usize>, smooths: bool) -> Self {
+    pub(super) fn new(
+        root: &'a Root,
+        morphs: &'a Morphs,
+        placed: &Placed,
+        variant: Option<usize>,
+        smooths: bool,
+    ) -> Self {
         let default = root.materials.len();
         let mut palette = Self {
             variant,
@@ -34,6 +42,7 @@ impl<'a> Palette<'a> {
             needs: Vec::new(),
             index: vec![None; default + 1],
             textures: Textures::new(root),
+            morphs,
         };
         let drawn = placed.variants.iter().filter(|v| v.drawn).filter_map(|v| root.meshes.get(v.mesh));
         for primitive in drawn.flat_map(|mesh| &mesh.primitives) {
@@ -61,7 +70,7 @@ impl<'a> Palette<'a> {
 
     /// What to read of a primitive, the `k`th of its mesh.
     pub(super) fn job<'j>(
-        &self,
+        &'j self,
         variant: &'j Variant,
         mesh: &'j source::Mesh,
         k: usize,
@@ -74,6 +83,7 @@ impl<'a> Palette<'a> {
             place: format!("meshes[{}].primitives[{k}]", variant.mesh),
             name: mesh.name.as_deref().unwrap_or_default(),
             weights: variant.weights.as_deref().or(mesh.weights.as_deref()).unwrap_or_default(),
+            changes: self.morphs.of_primitive(variant.mesh, k),
             skin: variant.skin.and_then(|s| skins.get(s)).and_then(Option::as_ref),
             needs: needs.cloned().unwrap_or_default(),
             drawn: variant.drawn,

@@ -41,23 +41,53 @@ fn of_a_target_that_changes_what_the_primitive_has_not_only_that_is_left_out() {
     assert!(told.ends_with("; that attribute of the target is left out"), "{told}");
 }
 
+/// A triangle of this colour and with these texture coordinates at all corners, which targets change.
+fn painted(color: [f32; 4], uv: [f32; 2], targets: impl FnOnce(&mut Builder) -> Value, weights: &[f32]) -> Loaded {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    let colors = file.floats("VEC4", &[color; 3].concat());
+    let uvs = [(); 2].map(|()| file.floats("VEC2", &[uv; 3].concat()));
+    let targets = targets(&mut file);
+    let attributes = json!({"POSITION": positions, "COLOR_0": colors, "TEXCOORD_0": uvs[0], "TEXCOORD_1": uvs[1]});
+    let primitive = json!({"attributes": attributes, "targets": targets, "material": 0});
+    file.set("images", json!([{"uri": picture()}])).set("textures", json!([{"source": 0}]));
+    file.set("materials", json!([{"emissiveTexture": {"index": 0, "texCoord": 1}}]));
+    file.set("meshes", json!([{"primitives": [primitive], "weights": weights}])).load()
+}
+
 #[test]
-fn targets_that_move_texture_coordinates_in_vain_are_told_where_they_have_a_weight() {
-    let told = |weights: &[f32], node: Option<&[f32]>| {
-        let mut file = Builder::new();
-        let (positions, uvs) = (file.triangle(), file.floats("VEC2", &[0.5; 6]));
-        let attributes = json!({"POSITION": positions, "TEXCOORD_0": uvs});
-        let primitive = json!({"attributes": attributes, "targets": [{"POSITION": positions}, {"TEXCOORD_0": uvs}]});
-        file.set("meshes", json!([{"primitives": [primitive], "weights": weights}]));
-        if let Some(weights) = node {
-            file.root["nodes"][0]["weights"] = json!(weights);
-        }
-        let warnings = file.load().warnings;
-        warnings.iter().filter(|w| w.code == "gltf-morph-unsupported").map(ToString::to_string).collect::<Vec<_>>()
+fn targets_change_colours_and_texture_coordinates_as_far_as_they_have_weight() {
+    let targets = |file: &mut Builder| {
+        let colors = file.floats("VEC3", &[[-1.0, 0.0, 1.0]; 3].concat());
+        let uvs = file.floats("VEC2", &[[0.5, -2.0]; 3].concat());
+        let bytes: Vec<u8> = [[-127_i8, 127, 0, -127]; 3].concat().into_iter().map(i8::cast_unsigned).collect();
+        let signed = file.accessor(&bytes, 5120, "VEC4", 3, true);
+        json!([{"COLOR_0": colors}, {"TEXCOORD_1": uvs}, {"COLOR_0": signed}])
     };
-    let text =
-        "a.gltf:meshes[0].primitives[0].targets[1].TEXCOORD_0: morphing of TEXCOORD_0 is not drawn; it stays as it is";
-    assert_eq!(told(&[0., 0.5], None), [text]);
-    assert_eq!(told(&[0., 0.], Some(&[0., 1.])), [text]);
-    assert_eq!(told(&[1., 0.], None), [""; 0]);
+    let shown = |weights: &[f32]| {
+        let loaded = painted([1.0, 0.0, 0.0, 0.8], [0.25, 0.5], targets, weights);
+        assert_eq!(codes(&loaded), [""; 0]);
+        let mesh = &loaded.scene.meshes[0];
+        assert!(mesh.colors.iter().all(|color| *color == mesh.colors[0]) && mesh.uvs[0].is_empty());
+        (mesh.colors[0].to_array(), mesh.uvs[1][2].to_array())
+    };
+    assert_eq!(shown(&[0.0; 3]), ([1.0, 0.0, 0.0, 0.8], [0.25, 0.5]));
+    assert_eq!(shown(&[0.5, 1.0, 0.0]), ([0.5, 0.0, 0.5, 0.8], [0.75, -1.5]));
+    assert_eq!(shown(&[0.0, -0.5, 0.5]), ([0.5, 0.5, 0.0, 0.8 - 0.5], [0.0, 1.5]));
+    assert_eq!(shown(&[2.0, 0.0, 0.5]), ([0.0, 0.5, 1.0, 0.8 - 0.5], [0.25, 0.5]), "colours end at 0 and 1");
+}
+
+#[test]
+fn what_a_target_changes_of_attributes_that_are_not_there_is_told_and_left_out() {
+    let loaded = morphing(
+        |file| {
+            let colors = file.floats("VEC3", &[1.0; 9]);
+            let uvs = file.floats("VEC3", &[1.0; 9]);
+            json!([{"COLOR_0": colors, "TEXCOORD_0": uvs}])
+        },
+        &[1.0],
+    );
+    let [format, missing] = ["attributes-accessor-invalid-format", "morph-target-no-base-accessor"];
+    assert_eq!(codes(&loaded), [missing, missing, format].map(|code| format!("gltf-mesh-primitive-{code}")));
+    assert!(loaded.scene.meshes[0].colors.is_empty());
 }
