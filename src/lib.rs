@@ -142,4 +142,6 @@ pub mod render;
 pub mod save;
 pub mod scene;
 pub mod stopwatch;
+#[cfg(all(unix, feature = "cli"))]
+mod sys;
 pub mod threads;

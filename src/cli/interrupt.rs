@@ -7,6 +7,8 @@
 use super::exit::Exit;
 use super::message::{self, Format};
 use crate::image;
+#[cfg(unix)]
+use crate::sys;
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,6 +27,8 @@ fn guards() -> MutexGuard<'static, usize> {
 /// Installs the handler, which tells the end in this form. Where the system refuses one, signals keep their usual effect.
 pub(super) fn install(format: Format) {
     FORMAT.get_or_init(|| format);
+    #[cfg(unix)]
+    let ignored = sys::ignored_ends();
     let _ = ctrlc::set_handler(|| {
         // Held until the process has ended, so that nothing begins that would have to be saved.
         let guards = guards();
@@ -33,6 +37,9 @@ pub(super) fn install(format: Format) {
             end();
         }
     });
+    // The handler takes all signals that end a process; whoever started this one may have wanted it to go on.
+    #[cfg(unix)]
+    ignored.into_iter().for_each(sys::ignore);
 }
 
 fn end() -> ! {

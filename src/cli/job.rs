@@ -13,6 +13,7 @@ use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::LoadOptions;
 use crate::render::{Cost, Instancing};
 use crate::scene::Background;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// A command line that cannot be carried out: one line, exit code 2.
@@ -169,7 +170,7 @@ impl RenderJob {
         let stats = stats(args);
         outputs::check_stats_file(stats.as_ref(), &batches, beside(args))?;
         let to_stdout = batches.iter().flat_map(|b| &b.shots).any(|s| s.target == Target::Stdout);
-        if to_stdout && stats.as_ref().is_some_and(|s| s.file.is_none()) {
+        if to_stdout && !args.dry_run && stats.as_ref().is_some_and(|s| s.file.is_none()) {
             return wrong("the picture goes to standard output, so the statistics cannot; add --stats-file PATH");
         }
         Ok(Self {
@@ -237,10 +238,14 @@ fn instances(args: &RenderArgs) -> Result<Instancing, Wrong> {
     }
 }
 
+/// Refuses to read standard input twice.
+pub(super) fn check_stdin(inputs: &[PathBuf]) -> Result<(), Wrong> {
+    let times = inputs.iter().filter(|input| input.as_path() == Path::new("-")).count();
+    if times > 1 { wrong("standard input (`-`) can be read only once") } else { Ok(()) }
+}
+
 fn check_flags(args: &RenderArgs) -> Result<(), Wrong> {
-    if args.inputs.iter().filter(|i| i.as_path() == Path::new("-")).count() > 1 {
-        return wrong("standard input (`-`) can be read only once");
-    }
+    check_stdin(&args.inputs)?;
     if args.inputs.is_empty() {
         return wrong("no input; name a model");
     }
@@ -262,6 +267,9 @@ fn check_flags(args: &RenderArgs) -> Result<(), Wrong> {
     }
     if args.merge && args.load.moment.animation.is_some() {
         return wrong("--animation chooses an animation of one file and cannot be used with --merge");
+    }
+    if args.profile && args.quiet && args.stats.is_none() {
+        return wrong("--profile tells where the time went, and --quiet silences it; leave one of them out");
     }
     if args.stats_file.is_some() && args.stats.is_none() && !args.dry_run {
         return wrong("--stats-file needs --stats text or --stats json");
@@ -287,6 +295,10 @@ fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -
     let steps = sequence::steps(args, sequence)?;
     let groups: Vec<Vec<PathBuf>> =
         if args.merge { vec![args.inputs.clone()] } else { args.inputs.iter().map(|i| vec![i.clone()]).collect() };
+    // A name that is made of theirs may be that of what belongs to another of them.
+    let is_made = args.output.as_deref().is_some_and(|name| name.contains('{'));
+    let sources: HashSet<PathBuf> =
+        args.inputs.iter().filter(|_| is_made).map(|input| outputs::folder_of(input)).collect();
     let mut batches = Vec::new();
     let mut frame = 0;
     for inputs in groups {
@@ -300,6 +312,7 @@ fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -
             let (several_views, numbered) = (choices.len() > 1, step.number.is_some());
             let naming = Naming { several_views, numbered, mirrors: !sub.as_os_str().is_empty() };
             let (target, kind, growth) = outputs::target(args, &fields, naming)?;
+            let target = target.spares_beside(&sources);
             shots.push(Shot { choice: choice.clone(), step: step.clone(), target, kind, growth });
         }
         batches.push(Batch { inputs, shots });
@@ -327,6 +340,9 @@ fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), Wrong> {
     }
     if args.bits == Some(16) && !all(FileKind::Png) {
         return wrong("--bits 16 belongs to PNG; an EXR stores floats, the other types 8 bits");
+    }
+    if args.bits.is_some() && all(FileKind::Exr) {
+        return wrong("--bits belongs to PNG; an EXR stores floats, of 16 bits, or 32 with --float");
     }
     // A picture that is repeated carries both, whatever it is; and errors may be counted in colours for a display.
     let serves = args.again.is_some() || args.sampling.error_space == Some(SpaceArg::Display);
@@ -430,7 +446,7 @@ mod tests {
     #[test]
     fn pictures_go_to_the_current_folder_under_the_stem() {
         assert_eq!(outputs("some/where/a.glb"), [Target::Default("a.png".into())]);
-        assert_eq!(outputs("a.glb b.obj -o {stem}.exr"), ["a.exr", "b.exr"].map(|n| Target::Named(n.into())));
+        assert_eq!(outputs("x/a.glb x/b.obj -o {stem}.exr"), ["a.exr", "b.exr"].map(|n| Target::Named(n.into())));
         assert_eq!(outputs("a.glb -o out/"), [Target::Default("out/a.png".into())]);
         assert_eq!(outputs("a.glb --format exr"), [Target::Default("a.exr".into())]);
         assert_eq!(outputs("a.glb -o -"), [Target::Stdout]);
@@ -479,6 +495,15 @@ mod tests {
     }
 
     #[test]
+    fn names_made_of_those_of_models_spare_what_lies_beside_any_of_them() {
+        let named = |line: &str| outputs(line).into_iter().map(|t| matches!(t, Target::Named(_))).collect::<Vec<_>>();
+        assert_eq!(named("x/a.obj b.obj -o {stem}.png"), [false, false]);
+        assert_eq!(named("x/a.obj x/b.obj -o {dir}/{stem}.png"), [false, false]);
+        assert_eq!(named("x/a.obj x/b.obj -o thumbs/{stem}.png"), [true, true]);
+        assert_eq!(named("a.obj -o a.png"), [true], "a name that was typed is meant");
+    }
+
+    #[test]
     fn pictures_of_a_sequence_are_numbered() {
         let named = |names: &[&str]| names.iter().map(|n| Target::Default((*n).into())).collect::<Vec<_>>();
         assert_eq!(outputs("a.glb --frames 9..11"), named(&["a.0009.png", "a.0010.png"]));
@@ -493,6 +518,11 @@ mod tests {
     }
 
     #[test]
+    fn what_is_only_foretold_leaves_standard_output_to_statistics() {
+        assert!(job("a.obj -o - --stats json --dry-run").is_ok());
+    }
+
+    #[test]
     fn contradictions_are_refused() {
         for line in [
             "a.obj --at 0,0,0",
@@ -503,6 +533,8 @@ mod tests {
             "a.obj -o picture.tif",
             "a.obj -o picture.jpg --format png",
             "a.obj -o - --stats json",
+            "a.obj --profile -q",
+            "a.obj -o a.exr --bits 8",
             "a.obj --stats-file s.json",
             "a.obj -o a.png --stats json --stats-file ./a.png",
             "a.obj --heatmap tests --stats json --stats-file a-tests.png",

@@ -10,7 +10,8 @@ use super::camera::Choice;
 use crate::image::Picture;
 use crate::image::tone::luminance;
 use crate::render::{Job, Sampling, Settings, render};
-use crate::scene::MAX_STOPS;
+use crate::scene::features::Features;
+use crate::scene::{MAX_STOPS, Scene};
 use std::time::Instant;
 
 /// Longest side of the small picture.
@@ -56,11 +57,13 @@ impl Metered {
     }
 }
 
+/// Whether the exposure of a scene's pictures is to be found: it has lamps that are measured, and something answers to them.
+pub(super) fn is_due(scene: &Scene) -> bool {
+    scene.photometric && !Features::of(scene).is_unlit()
+}
+
 /// Stops to add, 0 where the scene is to be shown as it is; `None` where nothing is lit.
 pub(super) fn exposure(job: &Job) -> Option<f32> {
-    if !job.scene.photometric {
-        return Some(0.0);
-    }
     let Settings { width, height, .. } = *job.settings;
     let shrink = |side: u32| (u64::from(side) * u64::from(SIDE)).div_ceil(u64::from(width.max(height)));
     #[expect(clippy::cast_possible_truncation, reason = "at most SIDE")]
@@ -74,7 +77,6 @@ pub(super) fn exposure(job: &Job) -> Option<f32> {
         layers: true,
         env_rays: Some(0),
         gloss_rays: Some(0),
-        everything: false,
         ..job.settings.clone()
     };
     let picture = render(&Job { settings: &settings, ..*job }, &()).picture;
@@ -108,10 +110,10 @@ mod tests {
     use crate::render::texture::TextureStore;
     use crate::render::view::Lens;
     use crate::render::{View, World};
-    use crate::scene::{Falloff, Light, LightKind, Material, Scene, Sphere};
+    use crate::scene::{Falloff, Light, LightKind, Material, Phong, Reflection, Scene, Sphere};
 
-    /// The exposure of a white ball under a lamp of so many candela, three units away.
-    fn metered(candela: f32, photometric: bool) -> Option<f32> {
+    /// The exposure of a white ball under a lamp of so many candela, three units away; also with everything on.
+    fn metered(candela: f32) -> Option<f32> {
         let kind = LightKind::Point {
             position: DVec3::new(0.0, 0.0, 4.0),
             falloff: Falloff::InverseSquare { range: f64::INFINITY },
@@ -121,7 +123,7 @@ mod tests {
             spheres: vec![Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 }],
             materials: vec![Material::plain()],
             lights: vec![Light { name: String::new(), intensity, kind, shadows: true, size: 0.0 }],
-            photometric,
+            photometric: true,
             ..Scene::default()
         };
         let world = World::new(&scene);
@@ -129,12 +131,17 @@ mod tests {
         let textures = TextureStore::new(&scene);
         let view = View::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, Lens::orthographic(3.0));
         let settings = &Settings::default();
-        exposure(&Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view: &view, settings })
+        let job = Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view: &view, settings };
+        let usual = exposure(&job);
+        let (world, textures) = (world.clone().with_everything(), TextureStore::new(&scene).with_everything());
+        let settings = &Settings { everything: true, ..Settings::default() };
+        assert_eq!(exposure(&Job { world: &world, textures: &textures, settings, ..job }), usual);
+        usual
     }
 
     #[test]
     fn lamps_that_blind_or_hardly_shine_are_brought_to_the_same_brightness() {
-        let (bright, dark) = (metered(30_000.0, true).unwrap(), metered(0.03, true).unwrap());
+        let (bright, dark) = (metered(30_000.0).unwrap(), metered(0.03).unwrap());
         assert!((dark - bright - libm::log2f(1e6)).abs() < 0.11, "{bright} {dark}");
         assert!(bright < -8.0 && dark > 6.0);
     }
@@ -154,9 +161,23 @@ mod tests {
     }
 
     #[test]
-    fn light_within_reach_and_light_without_units_stay_as_they_are() {
-        assert_eq!(metered(20.0, true), Some(0.0));
-        assert_eq!(metered(30_000.0, false), Some(0.0));
-        assert_eq!(metered(0.0, true), None);
+    fn light_within_reach_stays_as_it_is() {
+        assert_eq!(metered(20.0), Some(0.0));
+        assert_eq!(metered(0.0), None);
+    }
+
+    #[test]
+    fn only_measured_lamps_that_something_answers_to_are_metered() {
+        let ball = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 };
+        let scene = |reflection, photometric| Scene {
+            spheres: vec![ball.clone()],
+            materials: vec![Material { reflection, ..Material::default() }],
+            photometric,
+            ..Scene::default()
+        };
+        let matt = || Reflection::Phong(Phong::default());
+        let due =
+            [scene(matt(), true), scene(matt(), false), scene(Reflection::Unlit, true)].map(|scene| is_due(&scene));
+        assert_eq!(due, [true, false, false]);
     }
 }

@@ -178,9 +178,15 @@ type Joined = (&'static str, fn(&OsStr) -> bool);
 const JOINED: [Joined; 3] = [
     // What is no list of costs is one that is mistyped, unless it is a file.
     ("--layers", |word| word.to_str().is_some_and(|list| parse::costs(list).is_ok()) || !is_file(word)),
-    ("--ortho", |word| word.to_str().is_some_and(|height| parse::ortho(height).is_ok())),
-    ("--smooth", |word| word.to_str().is_some_and(|lean| parse::lean(lean).is_ok())),
+    ("--ortho", |word| word.to_str().is_some_and(|height| parse::ortho(height).is_ok()) || is_like_a_number(word)),
+    ("--smooth", |word| word.to_str().is_some_and(|lean| parse::lean(lean).is_ok()) || is_like_a_number(word)),
 ];
+
+/// What begins as a number does is one that is mistyped, unless it is a file.
+fn is_like_a_number(word: &OsStr) -> bool {
+    let letters = word.as_encoded_bytes();
+    letters.first().is_some_and(|c| c.is_ascii_digit() || b"+.".contains(c)) && !Path::new(word).exists()
+}
 
 /// Lets `--layers tests,steps` stand for `--layers=tests,steps`, while in `--layers ship.glb` the flag stands alone.
 fn with_joined(mut words: Vec<OsString>, (flag, is_value): &Joined) -> Vec<OsString> {
@@ -262,6 +268,8 @@ mod tests {
             ("meshray render a.glb --layers tets -q", "meshray render a.glb --layers=tets -q"),
             ("meshray render --ortho 5 a.glb --smooth 60", "meshray render --ortho=5 a.glb --smooth=60"),
             ("meshray trace a.glb --ortho auto", "meshray trace a.glb --ortho=auto"),
+            ("meshray render a.glb --ortho 0 --smooth 200", "meshray render a.glb --ortho=0 --smooth=200"),
+            ("meshray render a.glb --ortho 5m", "meshray render a.glb --ortho=5m"),
         ] {
             assert_eq!(joined(line), words(expected));
         }

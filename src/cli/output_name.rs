@@ -9,6 +9,7 @@ use crate::image::destination;
 use crate::load::paths::lexical;
 use crate::load::suggest::nearest;
 use std::collections::HashMap;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf, is_separator};
 
 /// What a template is filled with.
@@ -27,11 +28,11 @@ pub(super) struct Fields<'a> {
 const FIELDS: [&str; 6] = ["dir", "sub", "stem", "ext", "view", "frame"];
 
 /// The input's name without folder and extension; `stdin` for `-`.
-pub(super) fn stem(input: &Path) -> String {
+pub(super) fn stem(input: &Path) -> OsString {
     if input == Path::new("-") {
         return "stdin".into();
     }
-    input.file_stem().map_or_else(|| "picture".into(), |s| s.to_string_lossy().into_owned())
+    input.file_stem().map_or_else(|| "picture".into(), OsStr::to_os_string)
 }
 
 /// Fills a template. Errors name the unknown field.
@@ -42,28 +43,29 @@ pub(super) fn fill(template: &str, fields: &Fields) -> Result<PathBuf, String> {
 /// The folder below which a template makes folders of its own: that in front of its first field, but for `{dir}`, which is
 /// there; `None` of a name without other fields.
 pub(super) fn grows_in(template: &str, fields: &Fields) -> Result<Option<PathBuf>, String> {
-    let (before, found) = filled(template, fields, |field| field != "dir")?;
-    let folder =
-        before.rsplit_once(is_separator).map_or(".", |(folder, _)| if folder.is_empty() { "/" } else { folder });
-    Ok(found.then(|| PathBuf::from(folder)))
+    let (mut before, found) = filled(template, fields, |field| field != "dir")?;
+    // So that what stands behind the last separator is a name, also where that is nothing.
+    before.push("x");
+    let folder = Path::new(&before).parent().filter(|folder| !folder.as_os_str().is_empty());
+    Ok(found.then(|| folder.unwrap_or(Path::new(".")).to_path_buf()))
 }
 
 /// What a template is filled to, up to the first field that is called so, and whether there was one.
-fn filled(template: &str, fields: &Fields, ends: impl Fn(&str) -> bool) -> Result<(String, bool), String> {
-    let mut name = String::new();
+fn filled(template: &str, fields: &Fields, ends: impl Fn(&str) -> bool) -> Result<(OsString, bool), String> {
+    let mut name = OsString::new();
     let mut rest = template;
     while let Some(at) = rest.find(['{', '}']) {
-        name.push_str(&rest[..at]);
+        name.push(&rest[..at]);
         let tail = &rest[at..];
         if let Some(after) = tail.strip_prefix("{{").or_else(|| tail.strip_prefix("}}")) {
-            name.push_str(&tail[..1]);
+            name.push(&tail[..1]);
             rest = after;
         } else if let Some((field, after)) = tail.strip_prefix('{').and_then(|t| t.split_once('}')) {
             if ends(field) {
                 return Ok((name, true));
             }
             let value = value(field, fields)?;
-            name.push_str(&value);
+            name.push(&value);
             // No way at all is no folder.
             rest = if value.is_empty() && field == "sub" {
                 after.strip_prefix(is_separator).unwrap_or(after)
@@ -74,24 +76,24 @@ fn filled(template: &str, fields: &Fields, ends: impl Fn(&str) -> bool) -> Resul
             return Err(format!("`{template}`: a brace without its partner; write {{{{ or }}}} for a plain brace"));
         }
     }
-    name.push_str(rest);
+    name.push(rest);
     Ok((name, false))
 }
 
-fn value(field: &str, fields: &Fields) -> Result<String, String> {
+fn value(field: &str, fields: &Fields) -> Result<OsString, String> {
     let (name, width) = field.split_once(':').unwrap_or((field, ""));
     if name != "frame" && !width.is_empty() {
         return Err(format!("`{{{field}}}`: only {{frame}} takes a width, as in {{frame:04}}"));
     }
     match name {
         "dir" => Ok(folder(fields.input)),
-        "sub" => Ok(fields.sub.to_string_lossy().into_owned()),
+        "sub" => Ok(fields.sub.into()),
         "stem" => Ok(stem(fields.input)),
-        "ext" => Ok(fields.input.extension().unwrap_or_default().to_string_lossy().into_owned()),
-        "view" => Ok(fields.view.replace(is_of_no_name, "_")),
+        "ext" => Ok(fields.input.extension().unwrap_or_default().into()),
+        "view" => Ok(fields.view.replace(is_of_no_name, "_").into()),
         "frame" => {
             let width: usize = if width.is_empty() { 0 } else { width.parse().map_err(|_| bad_width(field))? };
-            if width > 20 { Err(bad_width(field)) } else { Ok(format!("{:0width$}", fields.frame)) }
+            if width > 20 { Err(bad_width(field)) } else { Ok(format!("{:0width$}", fields.frame).into()) }
         }
         _ => {
             let hint = nearest(name, FIELDS).map_or_else(String::new, |n| format!("; did you mean {{{n}}}?"));
@@ -112,11 +114,8 @@ fn bad_width(field: &str) -> String {
     format!("`{{{field}}}`: the width is a number from 1 to 20, as in {{frame:04}}")
 }
 
-fn folder(input: &Path) -> String {
-    match input.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent.to_string_lossy().into_owned(),
-        _ => ".".into(),
-    }
+fn folder(input: &Path) -> OsString {
+    input.parent().filter(|parent| !parent.as_os_str().is_empty()).map_or_else(|| ".".into(), Into::into)
 }
 
 /// What has to be in a name to tell the pictures of one input apart.
@@ -145,7 +144,8 @@ pub(super) fn default_template(folder: Option<&str>, naming: Naming, extension: 
     }
 }
 
-fn escape(plain: &str) -> String {
+/// A template that is filled to just this.
+pub(super) fn escape(plain: &str) -> String {
     plain.replace('{', "{{").replace('}', "}}")
 }
 
@@ -195,6 +195,17 @@ mod tests {
         assert_eq!(fill("{dir}/x", &fields("ship.obj")).unwrap(), Path::new("./x"));
         assert_eq!(fill("{stem}.png", &fields("-")).unwrap(), Path::new("stdin.png"));
         assert_eq!(fill("{stem}.{ext}.png", &fields("a/ship.v2.obj")).unwrap(), Path::new("ship.v2.obj.png"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn names_that_are_no_text_stay_as_they_are() {
+        use std::os::unix::ffi::OsStringExt;
+        let name = |letters: &[u8]| PathBuf::from(OsString::from_vec(letters.to_vec()));
+        let (input, sub) = (name(b"\xf1/\xf2.obj"), name(b"\xf3"));
+        let fields = Fields { input: &input, sub: &sub, ..fields("") };
+        assert_eq!(fill("{dir}/{sub}/{stem}.png", &fields).unwrap(), name(b"\xf1/\xf3/\xf2.png"));
+        assert_eq!(grows_in("{dir}/{sub}/{stem}.png", &fields).unwrap(), Some(name(b"\xf1")));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::image::FileKind;
 use crate::load::Diagnostic;
 use crate::load::paths::lexical;
 use crate::render::Cost;
+use std::collections::HashSet;
 use std::fs;
 use std::path::{Component, Path, PathBuf, absolute, is_separator};
 
@@ -23,6 +24,14 @@ pub(super) enum Target {
 }
 
 impl Target {
+    /// The same, but of what lies in one of these folders only a picture that meshray wrote is replaced.
+    pub(super) fn spares_beside(self, folders: &HashSet<PathBuf>) -> Self {
+        match self {
+            Self::Named(path) if folders.contains(&folder_of(&path)) => Self::Default(path),
+            other => other,
+        }
+    }
+
     /// The file, if it is one.
     pub(super) fn path(&self) -> Option<&Path> {
         match self {
@@ -30,6 +39,12 @@ impl Target {
             Self::Named(path) | Self::Default(path) => Some(path),
         }
     }
+}
+
+/// The folder of a file, in one spelling.
+pub(super) fn folder_of(file: &Path) -> PathBuf {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    lexical(&absolute(folder).unwrap_or_else(|_| folder.to_path_buf()))
 }
 
 /// The folder that may be made for a picture, in one that is there, and below which others may, if there is one.
@@ -46,7 +61,7 @@ pub(super) fn target(args: &RenderArgs, fields: &Fields, naming: Naming) -> Resu
             (usual(Some(folder)), Target::Default)
         }
         Some(template) => (template.to_owned(), Target::Named),
-        None => (usual(None), Target::Default),
+        None => (name_again(args).unwrap_or_else(|| usual(None)), Target::Default),
     };
     let path = output_name::fill(&template, fields).map_err(Wrong)?;
     // What leads out of it again is not made.
@@ -64,6 +79,14 @@ pub(super) fn target(args: &RenderArgs, fields: &Fields, naming: Naming) -> Resu
         (None, Err(e)) => return wrong(format!("{e}, or say --format")),
     };
     Ok((kept(path), kind, growth))
+}
+
+/// What a picture that is repeated is called: as the one that it is made by.
+fn name_again(args: &RenderArgs) -> Option<String> {
+    let name = Path::new(args.again.as_ref()?.file_name()?);
+    let kind = FileKind::from_path(name).ok()?;
+    let fits = args.format.is_none_or(|format| FileKind::from(format) == kind);
+    fits.then(|| name.to_str().map(output_name::escape)).flatten()
 }
 
 /// What is written beside each picture, under a name made from its own.
@@ -141,7 +164,7 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
         let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
         format!("{}{parts}", input.display())
     };
-    if what(a) == what(b) {
+    if shots[a].0 == shots[b].0 && what(a) == what(b) {
         return wrong(format!("{} is asked for twice", what(a)));
     }
     // Most often one model in two types of file.

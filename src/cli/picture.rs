@@ -7,7 +7,8 @@ use super::outputs::{self, Target};
 use crate::image::{ExrSamples, FileKind, Metadata, Output, Picture, PngDepth, ToneMap, encode};
 use crate::load::Diagnostic;
 use crate::render::{Sampling, Settings};
-use crate::scene::{Background, Environment, RenderHints, Scene};
+use crate::scene::features::Features;
+use crate::scene::{Background, Environment, Scene};
 use std::io::{self, Write};
 
 /// What applies to one picture.
@@ -23,10 +24,9 @@ pub(super) struct Effective {
 
 impl Effective {
     /// The command line first, then the scene file, then the defaults.
-    pub(super) fn new(look: &Look, hints: &RenderHints) -> Result<Self, String> {
-        let usual = Settings::default();
+    pub(super) fn new(look: &Look, scene: &Scene) -> Result<Self, String> {
+        let (usual, hints) = (Settings::default(), &scene.hints);
         let (width, height) = look.size.or(hints.size).unwrap_or((usual.width, usual.height));
-        let hinted = hints.tone_map.as_deref().map(str::parse::<ToneMap>).transpose().map_err(|e| e.to_string())?;
         let (samples, sampling) = look.sampling.sampling(hints);
         Ok(Self {
             settings: Settings {
@@ -46,7 +46,7 @@ impl Effective {
                 everything: false,
             },
             output: Output {
-                tone_map: look.tone_map.or(hinted).unwrap_or_default(),
+                tone_map: tone_map(look.tone_map, scene)?,
                 exposure: look.exposure.or(hints.exposure).unwrap_or(0.0),
                 png_depth: look.png,
                 exr_samples: look.exr,
@@ -55,6 +55,14 @@ impl Effective {
             metered: look.exposure.or(hints.exposure).is_none(),
         })
     }
+}
+
+/// The curve that was asked for, or that of the scene file; else the usual one, and none where nothing answers to light: curves
+/// make room for highlights, and what is unlit has none, and means its colours as they are.
+pub(super) fn tone_map(typed: Option<ToneMap>, scene: &Scene) -> Result<ToneMap, String> {
+    let hinted = scene.hints.tone_map.as_deref().map(str::parse::<ToneMap>).transpose().map_err(|e| e.to_string())?;
+    let usual = || if Features::of(scene).is_unlit() { ToneMap::None } else { ToneMap::default() };
+    Ok(typed.or(hinted).unwrap_or_else(usual))
 }
 
 /// How wide points or lines so narrow are, pixels, in a picture of a model about so large, both in world units.
@@ -167,10 +175,20 @@ pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: Behind) -> u6
 
 /// A fault when the picture alone needs more than the memory that is allowed.
 pub(super) fn too_large(effective: &Effective, kind: FileKind, behind: Behind, limit: u64) -> Option<Diagnostic> {
-    let (settings, need) = (&effective.settings, bytes(effective, kind, behind));
+    let settings = &effective.settings;
+    beyond((settings.width, settings.height), bytes(effective, kind, behind), limit)
+}
+
+/// The same of a picture that is judged, and of which nothing is kept but what its pixels cost.
+pub(super) fn too_large_to_judge((width, height): (u32, u32), limit: u64) -> Option<Diagnostic> {
+    /// Light, counts, and both once more of what it is compared with.
+    const OF_PIXEL: u64 = 64;
+    beyond((width, height), u64::from(width) * u64::from(height) * OF_PIXEL, limit)
+}
+
+fn beyond((width, height): (u32, u32), need: u64, limit: u64) -> Option<Diagnostic> {
     (need > limit).then(|| {
-        let text =
-            format!("a {}×{} picture needs {need} bytes where {limit} are allowed", settings.width, settings.height);
+        let text = format!("a {width}×{height} picture needs {need} bytes where {limit} are allowed");
         Diagnostic::new("picture-too-large", "", "", text).remedy("choose a smaller --size or raise --max-memory")
     })
 }
@@ -223,22 +241,40 @@ pub(super) fn write(shot: &Shot, bytes: &[u8]) -> Result<(), WriteError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::DVec3;
+    use crate::scene::{Material, Phong, Reflection, RenderHints, Sphere};
 
     #[test]
     fn the_command_line_overrides_the_scene_file_which_overrides_the_defaults() {
         let hints =
             RenderHints { depth: Some(5), samples: Some(9), tone_map: Some("aces".into()), ..Default::default() };
-        let effective = Effective::new(&Look { depth: Some(1), ..Look::default() }, &hints).unwrap();
+        let scene = Scene { hints, ..Scene::default() };
+        let effective = Effective::new(&Look { depth: Some(1), ..Look::default() }, &scene).unwrap();
         assert_eq!((effective.settings.depth, effective.settings.samples), (Some(1), 9));
         assert_eq!((effective.settings.width, effective.output.tone_map), (1024, ToneMap::Aces));
     }
 
     #[test]
+    fn colours_that_no_light_changes_are_shown_as_they_are_unless_somebody_wants_a_curve() {
+        let ball = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 };
+        let with = |reflection| Scene {
+            materials: vec![Material { reflection, ..Material::default() }, Material::plain()],
+            spheres: vec![ball.clone()],
+            ..Scene::default()
+        };
+        let (unlit, lit) = (with(Reflection::Unlit), with(Reflection::Phong(Phong::default())));
+        assert_eq!(tone_map(None, &unlit), Ok(ToneMap::None));
+        assert_eq!(tone_map(None, &lit), Ok(ToneMap::Neutral));
+        assert_eq!(tone_map(Some(ToneMap::Aces), &unlit), Ok(ToneMap::Aces));
+        let hints = RenderHints { tone_map: Some("reinhard".into()), ..RenderHints::default() };
+        assert_eq!(tone_map(None, &Scene { hints, ..unlit }), Ok(ToneMap::Reinhard));
+    }
+
+    #[test]
     fn a_picture_beyond_the_memory_allowed_is_refused() {
-        let big =
-            Effective::new(&Look { size: Some((65_535, 65_535)), ..Look::default() }, &RenderHints::default()).unwrap();
+        let big = Effective::new(&Look { size: Some((65_535, 65_535)), ..Look::default() }, &Scene::default()).unwrap();
         assert!(too_large(&big, FileKind::Png, Behind::default(), 8 << 30).is_some());
-        let usual = Effective::new(&Look::default(), &RenderHints::default()).unwrap();
+        let usual = Effective::new(&Look::default(), &Scene::default()).unwrap();
         assert!(too_large(&usual, FileKind::Exr, Behind { costs: 4, counted: true }, 8 << 30).is_none());
     }
 }

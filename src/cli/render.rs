@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::job::{Batch, RenderJob, Shot};
 use super::message::{Messages, Severity};
 use super::meter::Metered;
-use super::outputs;
+use super::outputs::{self, Target};
 use super::picture::Effective;
 use super::profile::Profile;
 use super::progress::Progress;
@@ -18,8 +18,8 @@ use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::number::so_many;
 use crate::pages;
 use crate::render::{Moved, Sampling, World};
+use crate::scene::Scene;
 use crate::scene::framing::{Bounds, robust_bounds_within};
-use crate::scene::{RenderHints, Scene};
 use crate::threads;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -60,8 +60,8 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
     }
     match &job.batches[..] {
         [only] if so_far.up_to_date == 1 && only.shots.len() == 1 => {
-            let picture = only.shots[0].target.path().unwrap_or(Path::new("-")).display();
-            messages.info("up-to-date", format!("{picture} is up to date"));
+            let picture = only.shots[0].target.path().unwrap_or(Path::new("-"));
+            messages.say(Severity::Info, &Diagnostic::new("up-to-date", picture, "", "is up to date"));
         }
         [_] if so_far.up_to_date > 0 => {
             messages.info("up-to-date", format!("{} are up to date", so_many(so_far.up_to_date, "picture")));
@@ -123,7 +123,7 @@ fn for_large_pages(job: &RenderJob) -> Duration {
     const OF_SAMPLE: u64 = 3;
     /// Samples of a pixel where errors decide; most need fewer.
     const SAMPLES: u32 = 8;
-    let Ok(Effective { settings, .. }) = Effective::new(&job.look, &RenderHints::default()) else {
+    let Ok(Effective { settings, .. }) = Effective::new(&job.look, &Scene::default()) else {
         return Duration::MAX;
     };
     let samples = match settings.sampling {
@@ -158,7 +158,9 @@ pub(super) fn writable_shots<'a>(
     let mut worst = Exit::Done;
     let mut shots = Vec::new();
     for shot in &batch.shots {
-        let mut targets = outputs::of(shot, job.beside()).into_iter();
+        // What is only foretold goes nowhere.
+        let goes = |target: &Target| !job.dry_run || target.path().is_some();
+        let mut targets = outputs::of(shot, job.beside()).into_iter().filter(goes);
         let growth = shot.growth.as_deref();
         match targets.try_for_each(|target| writable::check_target(&target, growth, &so_far.sources)) {
             Ok(()) => shots.push(shot),
@@ -210,7 +212,7 @@ pub(super) fn render_batch(
 fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit, Exit> {
     let Task { job, batch, messages, progress } = *task;
     let mut profile = if so_far.pictures.is_empty() { Profile::of_process() } else { Profile::new() };
-    let aspect = |scene: &Scene| Effective::new(&job.look, &scene.hints).map_or(1.0, |effective| effective.aspect());
+    let aspect = |scene: &Scene| Effective::new(&job.look, scene).map_or(1.0, |effective| effective.aspect());
     let survey = Survey::of(job, batch, aspect, messages, progress)?;
     survey.iter().for_each(|_| profile.done("frame"));
     so_far.shown = false;

@@ -326,7 +326,7 @@ pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
     if let Some(to) = sampled.targeted {
         let at_most = if to.estimate.is_none() { "at most " } else { "" };
         return format!(
-            "{:.1} samples a pixel (at most {}) and {:.1} to find out how many, error {at_most}{:.4} where {} was asked for (foretold {:.4} and {:.1} s of processor time, took {:.1} s)",
+            "{:.1} samples a pixel (at most {}) and {:.1} to find out how many, of what they met error {at_most}{:.4} where {} was asked for (foretold {:.4} and {:.1} s of processor time, took {:.1} s)",
             each(own),
             sampled.most(),
             each(sampled.rays.saturating_sub(own)),

@@ -53,6 +53,9 @@ pub(super) fn model(args: &ModelArgs, eye: &EyeArgs, size: (u32, u32), messages:
     let file = args.input.as_path();
     let fail = |fault: Diagnostic| messages.fail(&fault, Exit::Input);
     let choice = Choice::of(eye, None).map_err(|wrong| messages.wrong(wrong))?;
+    if let Some(fault) = picture::too_large_to_judge(size, args.load.limits().memory) {
+        return Err(messages.fail(&fault, Exit::Failed));
+    }
     let mut loaded = read::model(args, messages)?;
     let world = World::new(&loaded.scene);
     if world.shapes.is_empty() {

@@ -105,7 +105,7 @@ fn textures<'s>(job: &RenderJob, scene: &'s Scene) -> TextureStore<'s> {
 
 /// The settings that apply to the pictures of a scene.
 fn effective(task: &Task, scene: &Scene) -> Result<Effective, Exit> {
-    match Effective::new(&task.job.look, &scene.hints) {
+    match Effective::new(&task.job.look, scene) {
         Ok(effective) => Ok(effective.with_everything(task.job.everything)),
         Err(text) => Err(task.fail(&Diagnostic::new("scene-value", task.file(), "", text), Exit::Input)),
     }
@@ -113,7 +113,7 @@ fn effective(task: &Task, scene: &Scene) -> Result<Effective, Exit> {
 
 /// Whether the exposure of a picture is found by looking.
 fn is_metered(effective: &Effective, shot: &Shot, scene: &Scene) -> bool {
-    effective.metered && shot.kind != FileKind::Exr && scene.photometric
+    effective.metered && shot.kind != FileKind::Exr && meter::is_due(scene)
 }
 
 /// What is found out about each picture behind it.
@@ -182,6 +182,9 @@ pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut S
         let work = Job { settings: &effective.settings, scene, world, accel, textures: &textures, view: &view };
         let (effective, reason, phrase) = (&effective, *reason, phrase.as_str());
         let prepared = Prepared { task, shot, effective, loaded, bounds, work, reason, phrase, light, is_frame };
+        if prepared.warn(so_far) && job.strict {
+            return prepared.refuse_warned();
+        }
         if job.dry_run { prepared.foretell(so_far) } else { prepared.draw(times, profile, so_far) }
     }))
 }
@@ -227,10 +230,6 @@ impl Prepared<'_> {
     fn draw(&self, mut times: Times, profile: &mut Profile, so_far: &mut SoFar) -> Exit {
         let Task { job, messages, progress, batch } = *self.task;
         let Self { shot, effective, loaded, work, .. } = self;
-        let is_warned = self.warn(so_far);
-        if is_warned && job.strict {
-            return self.refuse_warned();
-        }
         profile.skip();
         // Until the picture is written the first signal ends no more than its rays.
         let _guard = job.keep_partial.then(interrupt::Guard::new);
@@ -383,7 +382,8 @@ impl Prepared<'_> {
             Ok(()) => {
                 let path = partial.target.path().unwrap_or(Path::new("-"));
                 let what = if rendered.complete { "the picture is" } else { "the tiles that were done are" };
-                messages.info("partial", format!("interrupted; {what} in {}", path.display()));
+                let fault = Diagnostic::new("interrupted", path, "", format!("interrupted; {what} kept here"));
+                messages.say(Severity::Error, &fault);
             }
             Err(picture::WriteError::Fault(fault)) => messages.say(Severity::Error, &fault),
             Err(picture::WriteError::BrokenPipe) => {}

@@ -10,11 +10,10 @@ use super::{accident, interrupt, meter, picture, sampling};
 use crate::accel::{AccelParams, auto};
 use crate::bench::study::report::{Format, text};
 use crate::bench::study::{Plan, Study, Subject, measure, reference, settings};
-use crate::image::{Output, ToneMap};
+use crate::image::Output;
 use crate::load::Diagnostic;
 use crate::render::texture::TextureStore;
 use crate::render::{Job, Settings};
-use crate::scene::Scene;
 use crate::scene::framing::robust_bounds;
 use crate::threads;
 use std::path::PathBuf;
@@ -31,7 +30,7 @@ pub(super) fn run(args: &StudyArgs) -> Exit {
         return messages.fail(&fault, Exit::Failed);
     }
     let name = args.model.input.display().to_string();
-    accident::guard(&name, &messages, || match threads::pool(args.threads.unwrap_or(0)) {
+    accident::guard(&name, &messages, || match threads::pool(args.threads.map_or(0, usize::from)) {
         Ok(pool) => pool.install(|| study(args, &files, &name, &messages).unwrap_or_else(|exit| exit)),
         Err(e) => {
             messages.error("threads", format!("no threads can be started: {e}"), "ask for fewer (--threads)");
@@ -49,12 +48,14 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
         .map_err(|fault| messages.fail(&fault, Exit::Failed))?;
     let scene = &loaded.scene;
     let base = Settings { seed: args.seed, ..seen::settings(args.size, None, &scene.hints) };
-    let tone_map = tone_map(args, scene).map_err(|fault| messages.fail(&fault, Exit::Input))?;
+    let tone_map = picture::tone_map(args.tone_map, scene).map_err(|why| {
+        messages.fail(&Diagnostic::new("scene-value", args.model.input.as_path(), "", why), Exit::Input)
+    })?;
     let (accel, _) = auto::build(args.accel, &world.shapes, &AccelParams::DEFAULT);
     let textures = TextureStore::new(scene);
     let given = args.exposure.or(scene.hints.exposure);
     let job = Job { scene, world: &world, accel: &accel, textures: &textures, view: &view, settings: &base };
-    let metered = given.is_none().then(|| meter::exposure(&job)).flatten();
+    let metered = (given.is_none() && meter::is_due(scene)).then(|| meter::exposure(&job)).flatten();
     let output = Output { tone_map, exposure: given.or(metered).unwrap_or(0.0), ..Output::default() };
     let output = picture::before(scene.background, output);
     let phrase = metered.map_or(phrase.clone(), |stops| format!("{phrase}, {}", meter::phrase(stops)));
@@ -105,13 +106,6 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
     messages.print(&text::conclusion(&study))?;
     told.write(&study)?;
     Ok(if study.complete { Exit::Done } else { Exit::Interrupted })
-}
-
-/// The curve that was asked for, or else that of the scene file.
-fn tone_map(args: &StudyArgs, scene: &Scene) -> Result<ToneMap, Diagnostic> {
-    let hinted = scene.hints.tone_map.as_deref().map(str::parse::<ToneMap>).transpose();
-    let hinted = hinted.map_err(|e| Diagnostic::new("scene-value", args.model.input.as_path(), "", e.to_string()))?;
-    Ok(args.tone_map.or(hinted).unwrap_or_default())
 }
 
 /// Where rows go as they come.

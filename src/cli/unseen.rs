@@ -1,6 +1,7 @@
 //! Pictures that show nothing, or next to nothing: they are written as they are, but not without a word.
 
 use super::camera::{self, Choice, LensChoice};
+use crate::accel::{AccelChoice, AccelKind, AccelParams};
 use crate::load::Diagnostic;
 use crate::render::{Coverage, Job, coverage};
 use crate::scene::Scene;
@@ -10,23 +11,32 @@ use std::path::Path;
 const FEW: usize = 10_000;
 
 /// What is to be said of a picture by such a choice of the eye, which is called so; nothing of those that show
-/// something, nor of those that take so long that nobody renders them without looking.
+/// something.
 pub(super) fn warning(
     job: &Job,
     (choice, view): (&Choice, &str),
     lens: Option<LensChoice>,
     file: &Path,
 ) -> Option<Diagnostic> {
-    if job.world.is_empty() || job.accel.kind().is_slow() {
+    if job.world.is_empty() {
         return None;
     }
-    let warning = said(coverage(job), (choice, lens), job.scene, file)?;
+    let warning = said(looked_through(job), (choice, lens), job.scene, file)?;
     Some(Diagnostic { text: format!("{view}: {}", warning.text), ..warning })
 }
 
-/// Whether anything is to be seen in a picture; also where that takes too long to find out.
+/// Whether anything is to be seen in a picture.
 pub(super) fn shows_something(job: &Job) -> bool {
-    job.accel.kind().is_slow() || !job.world.is_empty() && coverage(job).shown
+    !job.world.is_empty() && looked_through(job).shown
+}
+
+/// How much of a picture shows something, whatever structure it has: all find the same hits, and slow ones would take long.
+fn looked_through(job: &Job) -> Coverage {
+    if !job.accel.kind().is_slow() {
+        return coverage(job);
+    }
+    let (accel, _) = job.world.structure(AccelChoice::Kind(AccelKind::DEFAULT), &AccelParams::DEFAULT);
+    coverage(&Job { accel: &accel, ..*job })
 }
 
 /// What is to be said of a sequence of which no picture shows anything.

@@ -1,6 +1,6 @@
 //! Whether a file may be written under a name: asked before any work is done for it.
 
-use super::output_name::identity;
+use super::output_name::{collision, identity};
 use super::outputs::Target;
 use crate::image::{destination, folder_takes, was_written_by_meshray};
 use crate::load::Diagnostic;
@@ -59,6 +59,9 @@ pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Di
     let fault = |code, text: &str, remedy: &str| Err(Diagnostic::new(code, path, "", text).remedy(remedy));
     let goal = destination(path);
     let folder = goal.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if folder.exists() && !folder.is_dir() {
+        return fault("output-in-file", "what should be its folder is a file", &format!("name another with {flag}"));
+    }
     if !folder.is_dir() {
         return fault(NO_FOLDER, "its folder is not there", &format!("create it, or name another with {flag}"));
     }
@@ -106,8 +109,12 @@ fn can_be(folder: &Path) -> bool {
     folder.is_dir() || folder.symlink_metadata().is_err() && parent.is_dir() && folder_takes(folder)
 }
 
-/// [`check`] for every `--report`, before any work.
+/// [`check`] for every `--report`, before any work; none may fall on another.
 pub(super) fn check_reports(paths: &[PathBuf], sources: &Sources) -> Result<(), Diagnostic> {
+    if let Some((_, later)) = collision(paths) {
+        let fault = Diagnostic::new("output-twice", paths[later].as_path(), "", "is named twice");
+        return Err(fault.remedy("give each --report a name of its own"));
+    }
     paths.iter().try_for_each(|path| check(path, "--report", sources))
 }
 

@@ -266,6 +266,10 @@ pub(crate) fn check_moment(loaded: &mut Loaded, file: &Path, options: &LoadOptio
 }
 
 fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    if let Some(root) = options.root.as_ref().filter(|root| !root.is_dir()) {
+        let fault = Diagnostic::new("root-missing", root.as_path(), "", "there is no such folder");
+        return Err(fault.remedy("name one that is there with --root").into());
+    }
     let mut budget = Budget::new(&options.limits);
     let mut loaded = load_within(source, options, &mut budget)?;
     loaded.facts.charged = options.limits.memory - budget.left();

@@ -4,6 +4,7 @@
 //! to several, each twice with different random numbers, until the error of the picture is as it should be ([`plan`]). Then
 //! the whole picture is rendered twice; the difference of both tells the error of their mean, whatever was right or wrong
 //! about the forecast, and as that is planned to be too large, a third rendering, seldom a fourth, makes it what was asked.
+//! What hardly any ray of either meets is in neither, and nothing here knows of it.
 
 use super::by_class::ByClass;
 use super::context::Context;

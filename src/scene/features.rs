@@ -199,6 +199,11 @@ impl Features {
         self.present.contains(&feature)
     }
 
+    /// Whether nothing answers to light: all is shown in the colours that it has.
+    pub fn is_unlit(&self) -> bool {
+        self.has(Feature::Unlit) && !self.has(Feature::MetalRough) && !self.has(Feature::Phong)
+    }
+
     /// What the scene needs, in the order of [`Feature::ALL`].
     pub fn present(&self) -> impl Iterator<Item = Feature> {
         Feature::ALL.into_iter().filter(|&feature| self.has(feature))

@@ -130,3 +130,13 @@ fn a_panorama_is_found_beside_the_picture_too() {
     folder.run(&["render", "--again", "moved/a.png", "-o", "b.png", "-q"]).ends(0);
     assert!(picture(&folder.path("b.png")).beauty == kept);
 }
+
+#[test]
+fn a_picture_that_is_repeated_without_a_name_is_called_as_it_was_and_replaces_no_other() {
+    let folder = Folder::with_cube();
+    folder.render(&["cube.obj"]).ends(0);
+    folder.render(&["cube.obj", "--view", "front,iso"]).ends(0);
+    let (usual, front) = (folder.read("cube.png"), folder.read("cube-front.png"));
+    folder.run(&["render", "--again", "cube-front.png"]).ends(0);
+    assert!(folder.read("cube.png") == usual && folder.read("cube-front.png") == front);
+}

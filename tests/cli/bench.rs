@@ -72,6 +72,20 @@ fn sizes_that_make_no_sense_are_bad_command_lines() {
     folder.run(&["bench", "cube.obj", "--generate", "tetra"]).ends(2);
     folder.run(&["bench", "--generate", "tetra", "--scene", "0"]).ends(2).says(&["--scene"]);
     folder.run(&["bench"]).ends(2);
+    folder.run(&["bench", "-", "-"]).ends(2).says(&["only once"]);
+}
+
+#[test]
+fn what_cannot_be_is_told_before_anything_is_measured() {
+    let folder = Folder::with_cube().file("other.json", "{\"schema\": \"meshray-spd/1\"}");
+    let words = ["bench", "cube.obj", "--baseline", "other.json", "--fail-if", "n_it>+1%"];
+    let run = folder.run(&words).ends(3).says(&["its schema is \"meshray-spd/1\""]);
+    assert_eq!(run.text(), "");
+    folder.run(&["bench", "cube.obj", "--report", "a.json", "--report", "./a.json"]).ends(1).says(&["named twice"]);
+    for command in ["bench", "explain", "study"] {
+        folder.run(&[command, "cube.obj", "--size", "65535x65535"]).ends(1).says(&["65535×65535 picture needs"]);
+    }
+    folder.run(&["verify", "cube.obj", "--rays", "1e15"]).ends(1).says(&["rays of each kind need"]);
 }
 
 #[test]

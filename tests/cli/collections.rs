@@ -33,8 +33,11 @@ fn the_folder_that_is_named_is_made_where_the_one_around_it_is_there() {
     assert!(folder.has("shots/iso/a.jpg") && folder.has("shots/iso/b.jpg"));
     folder.render(&["all/a.obj", "-o", "{dir}/beside/{stem}.png"]).ends(0);
     assert!(folder.has("all/beside/a.png"));
-    for elsewhere in ["gone/deeper/", "gone/deeper/{stem}.png", "gone/a.png", "file/", "file/{stem}.png"] {
+    for elsewhere in ["gone/deeper/", "gone/deeper/{stem}.png", "gone/a.png"] {
         folder.render(&["all/a.obj", "-o", elsewhere]).ends(1).says(&["its folder is not there"]);
+    }
+    for elsewhere in ["file/", "file/{stem}.png"] {
+        folder.render(&["all/a.obj", "-o", elsewhere]).ends(1).says(&["what should be its folder is a file"]);
     }
     assert!(!folder.has("gone"));
     folder.render(&["file", "-o", "never/"]).ends(3);
@@ -135,7 +138,7 @@ fn what_a_model_reads_beside_its_own_file_counts_too() {
     let folder = textured_cube();
     let update = || folder.render(&["cube.obj", "--update"]);
     update().ends(0);
-    update().ends(0).says(&["cube.png is up to date"]);
+    update().ends(0).says(&["cube.png: is up to date"]);
     let names = folder.names();
     let map = names.iter().find(|name| name.ends_with(".mtl")).expect("a library");
     let library = String::from_utf8(folder.read(map)).unwrap();
@@ -145,11 +148,11 @@ fn what_a_model_reads_beside_its_own_file_counts_too() {
     // What was looked for in vain may be there the next time.
     std::fs::remove_file(folder.path(map)).unwrap();
     update().says(&[map]);
-    update().says(&[map, "cube.png is up to date"]);
+    update().says(&[map, "cube.png: is up to date"]);
     std::fs::write(folder.path(map), library).unwrap();
     let run = update().ends(0);
     assert!(!run.stderr.contains("up to date"), "{}", run.stderr);
-    update().says(&["cube.png is up to date"]);
+    update().says(&["cube.png: is up to date"]);
 }
 
 #[test]
@@ -202,28 +205,32 @@ fn many_inputs_side_by_side_make_what_they_make_one_by_one_and_say_it_in_their_o
     folder.render(&["all", "-o", "out/", "--threads", "3", "--update"]).says(&[summary, "6 of them failed"]);
 }
 
-/// `b.png` is what `a.obj` shows, and where the picture of `b.obj` would go.
+/// `t/b.png` is what `a.obj` shows, and where the picture of `b.obj` would go.
 fn with_a_texture_in_the_way() -> Folder {
     let cubes = |folder: Folder| (0..9).fold(folder, |folder, i| folder.file(&format!("m/z{i}.obj"), CUBE));
     let texture = textured_cube().read("cube.jpg");
     cubes(Folder::new())
         .file("m/a.obj", format!("mtllib a.mtl\nusemtl a\n{CUBE}"))
-        .file("m/a.mtl", "newmtl a\nmap_Kd b.png\n")
-        .file("m/b.png", texture)
+        .file("m/a.mtl", "newmtl a\nmap_Kd ../t/b.png\n")
+        .file("t/b.png", texture)
         .file("m/b.obj", CUBE)
 }
 
 #[test]
 fn no_picture_replaces_what_another_model_shows_neither_side_by_side_nor_when_that_is_up_to_date() {
     let folder = with_a_texture_in_the_way();
-    let texture = folder.read("m/b.png");
+    let texture = folder.read("t/b.png");
     for (threads, further) in
         [("1", "--quiet"), ("2", "--quiet"), ("2", "--update"), ("2", "--update"), ("1", "--update")]
     {
-        let words = ["m", "-o", "m/{sub}/{stem}.png", "--threads", threads, further];
-        folder.render(&words).ends(1).says(&["m/b.png: would replace a file that is read"]);
-        assert!(folder.read("m/b.png") == texture, "{words:?}");
+        let words = ["m", "--root", ".", "-o", "t/{sub}/{stem}.png", "--threads", threads, further];
+        folder.render(&words).ends(1).says(&["t/b.png: would replace a file that is read"]);
+        assert!(folder.read("t/b.png") == texture, "{words:?}");
     }
+    // Beside a model none is replaced that meshray did not write, read or not.
+    let folder = folder.file("m/b.png", "mine");
+    folder.render(&["m/b.obj", "m/z1.obj", "-o", "m/{stem}.png"]).ends(1).says(&["m/b.png: exists and is no picture"]);
+    assert!(folder.read("m/b.png") == b"mine" && folder.has("m/z1.png"));
 }
 
 #[test]
@@ -263,12 +270,12 @@ fn what_would_be_found_before_what_was_found_is_noticed() {
     let update = || folder.render(&["cube.obj", "--update"]);
     std::fs::write(folder.path("cube.mtl"), "newmtl a\nmap_Kd CUBE.jpg\n").unwrap();
     update().ends(0);
-    update().ends(0).says(&["cube.png is up to date"]);
+    update().ends(0).says(&["cube.png: is up to date"]);
     // Where that is another file.
     if !folder.has("CUBE.jpg") {
         std::fs::copy(folder.path("cube.jpg"), folder.path("CUBE.jpg")).unwrap();
         assert!(!update().ends(0).stderr.contains("up to date"));
-        update().ends(0).says(&["cube.png is up to date"]);
+        update().ends(0).says(&["cube.png: is up to date"]);
     }
     // With --strict it is another wish: there was to be no warning.
     assert!(!folder.render(&["cube.obj", "--update", "--strict"]).stderr.contains("up to date"));

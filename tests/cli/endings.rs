@@ -133,6 +133,12 @@ fn a_scene_that_cannot_be_written_is_not_made() {
 }
 
 #[test]
+fn a_root_that_is_not_there_is_told_as_that() {
+    let folder = Folder::with_cube();
+    folder.render(&["cube.obj", "--root", "gone"]).ends(3).says(&["gone: there is no such folder", "--root"]);
+}
+
+#[test]
 fn warnings_do_not_stop_a_picture_unless_strict() {
     let folder = Folder::new().file("cube.obj", cube_with_a_bad_face());
     folder.render(&["cube.obj"]).ends(0).says(&["warning: cube.obj"]);

@@ -12,7 +12,29 @@ fn start(folder: &Folder, arguments: &[&str]) -> Child {
 }
 
 fn signal(child: &Child) {
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    // Not that of Ctrl-C: whoever runs these in the background may have told them to take no notice of it.
+    send(child, "-TERM");
+}
+
+fn send(child: &Child, signal: &str) {
+    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+}
+
+#[test]
+fn a_signal_that_whoever_started_it_wants_ignored_ends_nothing() {
+    let folder = Folder::with_cube();
+    for signal in ["HUP", "INT"] {
+        let line = format!("trap '' {signal}; exec \"$@\"");
+        let words = [&["-c", &line, "sh", env!("CARGO_BIN_EXE_meshray")], &LONG[..]].concat();
+        let mut child =
+            Command::new("sh").args(words).current_dir(folder.path("")).stderr(Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(1500));
+        send(&child, &format!("-{signal}"));
+        std::thread::sleep(Duration::from_millis(500));
+        assert!(child.try_wait().unwrap().is_none(), "{signal} ended it");
+        send(&child, "-TERM");
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{signal}");
+    }
 }
 
 /// A render that takes minutes.

@@ -101,6 +101,11 @@ fn pictures_that_show_next_to_nothing_are_written_with_a_warning() {
         .render(&away)
         .ends(0)
         .says(&["warning: cube.obj: given eye: none of 4096 rays", "aim the eye with --at"]);
+    // Whatever finds the hits.
+    for more in [["--accel", "none"], ["--dry-run", "-q"]] {
+        let run = Folder::with_cube().render(&[&away[..], &more, &["--strict"]].concat()).ends(3);
+        assert_eq!(run.says(&["none of 4096 rays", "--strict"]).text(), "");
+    }
     // Neither of two halves of the model can be called stray.
     let apart = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 100000 0 0\nv 100001 0 0\nv 100000 1 0\nf 1 2 3\nf 4 5 6\n";
     let folder = Folder::new().file("apart.obj", apart);

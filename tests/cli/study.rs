@@ -12,6 +12,7 @@ fn a_study_measures_every_setting_and_says_which_to_use() {
     for line in ["--quality normal", "--samples 64", "--aa adaptive", "--intersector", "for draft:", "for final:"] {
         assert!(run.text().contains(line), "{line}\n{}", run.text());
     }
+    assert!(!run.text().contains("metered"), "it has no lamps: {}", run.text());
     let json: Value = serde_json::from_slice(&folder.read("a.json")).unwrap();
     assert_eq!((&json["schema"], &json["complete"]), (&"meshray-study/1".into(), &true.into()));
     let rows = json["rows"].as_array().unwrap();

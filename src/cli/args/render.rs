@@ -30,8 +30,8 @@ pub(in crate::cli) struct RenderArgs {
     /// Without it the picture goes to STEM.png in the current folder. Pictures of models in the folders of a folder that was
     /// named go to folders like these: {sub} is the way from the folder that was named to the model's own. A folder given here
     /// is made, and so are those of a template with fields other than {dir}, where what the first lies in is there.
-    /// Names that are made up, in a folder given here and of heat maps too, replace only a picture that meshray wrote; a name
-    /// given here replaces whatever is there.
+    /// Names that are made up, in a folder given here and of heat maps too, and those of a template beside any of the models,
+    /// replace only a picture that meshray wrote; a name given here replaces whatever is there.
     #[arg(short, long, value_name = "PATH", help_heading = "Output", allow_hyphen_values = true)]
     pub output: Option<String>,
     /// Columns and rows of the picture; one number is a square [default: 1024x768]
@@ -65,7 +65,8 @@ pub(in crate::cli) struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = parse::above_zero, requires = "heatmap", help_heading = "Output",
           hide_short_help = true)]
     pub heatmap_max: Option<f64>,
-    /// How linear light becomes display colour; not for EXR, which stays linear [default: neutral]
+    /// How linear light becomes display colour; not for EXR, which stays linear [default: neutral, or none where all is
+    /// unlit]
     #[arg(long, value_name = "NAME", value_parser = parse::named::<ToneMap>(), help_heading = "Output",
           hide_short_help = true)]
     pub tone_map: Option<ToneMap>,

@@ -21,7 +21,7 @@ pub(in crate::cli) struct StudyArgs {
     /// From where it is seen.
     #[command(flatten)]
     pub eye: EyeArgs,
-    /// How linear light becomes display colour [default: neutral]
+    /// How linear light becomes display colour [default: neutral, or none where all is unlit]
     #[arg(long, value_name = "NAME", value_parser = parse::named::<ToneMap>(), help_heading = "Picture")]
     pub tone_map: Option<ToneMap>,
     /// Brighter (+) or darker (-) by this many stops
@@ -44,8 +44,8 @@ pub(in crate::cli) struct StudyArgs {
           help_heading = "Run")]
     pub accel: AccelChoice,
     /// Threads that render [default: all]
-    #[arg(long, value_name = "N", value_parser = parse::positive, help_heading = "Run")]
-    pub threads: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Run")]
+    pub threads: Option<u16>,
     /// What the kernels may use.
     #[command(flatten)]
     pub simd: SimdArgs,

@@ -24,7 +24,10 @@ impl Gate {
             messages.fail(&fault.remedy("write one with --report NAME.json"), exit)
         };
         let text = fs::read_to_string(path).map_err(|e| fail(Exit::Failed, e.to_string()))?;
-        let baseline = serde_json::from_str(&text).map_err(|e| fail(Exit::Input, format!("not JSON: {e}")))?;
+        let baseline: Value = serde_json::from_str(&text).map_err(|e| fail(Exit::Input, format!("not JSON: {e}")))?;
+        if baseline["schema"] != json::SCHEMA {
+            return Err(fail(Exit::Input, format!("its schema is {}, not {}", baseline["schema"], json::SCHEMA)));
+        }
         Ok(Self { path: path.to_owned(), baseline, limits: limits.to_vec() })
     }
 

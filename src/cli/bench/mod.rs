@@ -106,6 +106,7 @@ fn subjects(args: &BenchArgs) -> Vec<Subject> {
 }
 
 fn plan(args: &BenchArgs) -> Result<Plan, Wrong> {
+    job::check_stdin(&args.inputs)?;
     let mut kinds: Vec<AccelKind> = Vec::new();
     for kind in &args.accel {
         if kinds.contains(kind) {

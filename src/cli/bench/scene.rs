@@ -3,7 +3,7 @@
 use super::super::camera::Choice;
 use super::super::exit::Exit;
 use super::super::message::Messages;
-use super::super::{read, seen};
+use super::super::{picture, read, seen};
 use super::args::BenchArgs;
 use crate::accel::{AccelChoice, AccelKind, AccelParams};
 use crate::bench::pruning::Pruning;
@@ -94,6 +94,9 @@ impl Prepared {
     /// Loads and frames; what is wrong is said.
     pub(super) fn new(subject: &Subject, args: &BenchArgs, messages: &Messages) -> Result<Self, Exit> {
         let choice = Choice::of(&args.eye, None).map_err(|wrong| messages.wrong(wrong))?;
+        if let Some(fault) = picture::too_large_to_judge(args.size, args.load.limits().memory) {
+            return Err(messages.fail(&fault, Exit::Failed));
+        }
         let mut loaded = subject.load(args, messages)?;
         let input = subject.path();
         let world =

@@ -3,7 +3,8 @@
 //! # Schema `meshray-inspect/1`
 //! One JSON object. `file`, `format`, `generator`, `hash`, `files` (all that were read); `triangles`, `polygons`,
 //! `faces`, `spheres`, `cones` (cylinders too), `planes`, `meshes`, `instances`, `materials`; `bounds` (`lo`, `hi`,
-//! metres) and `framed` (the same without strays) with `strays`; `units`, `up`, `up_reason`; `topology` (`corners`,
+//! metres) and `framed` (the same without strays) with `strays`; `units`, `up`, `up_reason`, `faces_back` (whether views
+//! turn with a front on the other side); `topology` (`corners`,
 //! `edges`, `open`, `non_manifold`, `duplicates`, `degenerate`; equal positions count as one corner; `by_object`: but
 //! not those of instances that are kept once, where all by themselves would take more memory than is allowed);
 //! `dropped` (by reason); `points_and_lines`, `wires` (of these `points` and `lines`, with `point_width` and

@@ -105,7 +105,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
         return Err(fail(Exit::Input)(seen::nothing_to_hit(file)));
     }
     let wrong = |text: String| Diagnostic::new("scene-value", file, "", text);
-    let effective = Effective::new(look, &loaded.scene.hints).map_err(wrong).map_err(fail(Exit::Input))?;
+    let effective = Effective::new(look, &loaded.scene).map_err(wrong).map_err(fail(Exit::Input))?;
     let settings = &effective.settings;
     inside(args, settings).map_err(|wrong| messages.wrong(wrong))?;
 

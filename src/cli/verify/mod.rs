@@ -43,11 +43,12 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Result<Exit, Exit> {
         }
         writable::check(path, "--plot", &Sources::of([&args.model.input])).map_err(fail)?;
     }
+    let limit = args.model.load.limits().memory;
+    check_rays(args.rays, limit).map_err(fail)?;
     let mut loaded = read::model_as_stored(&args.model.input, &args.model.load, messages)?;
     if let Some(path) = &args.plot {
         Sources::of(&loaded.facts.files).spared_by(path, "--plot").map_err(fail)?;
     }
-    let limit = args.model.load.limits().memory;
     let unjudged = reduce(&mut loaded, limit, &args.model.input).map_err(fail)?;
     let name = args.model.input.display().to_string();
     let plan = Plan { rays: args.rays, seed: args.seed, ..Plan::DEFAULT };
@@ -70,6 +71,18 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Result<Exit, Exit> {
     let text = "the exact test or a structure gave a wrong hit";
     let fault = Diagnostic::new("hits-not-exact", &args.model.input, "", text);
     Err(fail(fault.remedy("please report it with the file")))
+}
+
+/// Refuses more rays of a kind than memory that is allowed has room for.
+fn check_rays(rays: usize, limit: u64) -> Result<(), Diagnostic> {
+    /// A ray, and what is found of it by one test and another.
+    const OF_RAY: u64 = 256;
+    let need = (rays as u64).saturating_mul(OF_RAY);
+    if need <= limit {
+        return Ok(());
+    }
+    let text = format!("{rays} rays of each kind need {need} bytes where {limit} are allowed");
+    Err(Diagnostic::new("too-many-rays", "", "", text).remedy("ask for fewer --rays or raise --max-memory"))
 }
 
 /// What came of the hard rays; `None` where there is nothing to aim at.

@@ -65,7 +65,7 @@ impl Sky {
             if run.is_none() {
                 some.iter().for_each(|&i| looks.add(i, dir(i)));
             }
-            looks.tell::<true>(up, &mut tell);
+            looks.tell::<true>(up, &mut |ray, wall| tell(ray, self.toned(wall)));
         }
     }
 }

@@ -10,7 +10,9 @@ pub(crate) use around::{Arounds, Standpoint};
 
 use super::shade::{Lobe, Seen};
 use super::studio;
+use crate::image::ToneMap;
 use crate::math::Vec3;
+use crate::scene::features::Features;
 use crate::scene::{Background, Environment, Scene, UpAxis};
 use chance::Chance;
 use panorama::Pyramid;
@@ -26,6 +28,9 @@ pub(crate) struct Sky {
     up: UpAxis,
     /// What secondary rays see of a scene without an environment: the background colour, as the founding texts say.
     backdrop: Vec3,
+    /// Whether what is behind everything looks as the usual tone curve makes it: pictures in which nothing answers to light
+    /// have none, and stand before the same walls as others.
+    is_toned: bool,
     map: Option<Map>,
 }
 
@@ -47,7 +52,8 @@ impl Sky {
             let chance = Chance::new(&pyramid);
             Map { pyramid, chance, turn: libm::sincosf(panorama.rotation) }
         });
-        Self { environment: scene.environment, up: scene.up, backdrop, map }
+        let is_toned = Features::of(scene).is_unlit();
+        Self { environment: scene.environment, up: scene.up, backdrop, is_toned, map }
     }
 
     /// Whether nothing comes from anywhere.
@@ -87,7 +93,14 @@ impl Sky {
     /// What is behind everything along a unit direction in which the eye looks, averaged over such a cone: the same, but of the
     /// studio its walls alone.
     pub(crate) fn behind(&self, dir: Vec3, angle: f32) -> Vec3 {
-        self.studio().map_or_else(|| self.radiance(dir, angle), |up| studio::backdrop(studio::from_world(up, dir)))
+        let walls = |up| self.toned(studio::backdrop(studio::from_world(up, dir)));
+        self.studio().map_or_else(|| self.radiance(dir, angle), walls)
+    }
+
+    /// A wall of the studio as it is to look behind everything.
+    #[inline(always)]
+    fn toned(&self, wall: Vec3) -> Vec3 {
+        if self.is_toned { ToneMap::default().map(wall.to_array()).into() } else { wall }
     }
 
     /// Mean radiance around a mirror direction, as wide as `roughness` (0 … 1) makes it.
