@@ -84,8 +84,8 @@ struct Integral {
 }
 
 /// Rows and columns of directions over one half of the hemisphere, which the other mirrors.
-const ROWS: usize = 64;
-const COLUMNS: usize = 32;
+const ROWS: usize = 40;
+const COLUMNS: usize = 24;
 
 impl Kernel for Integral {
     type Output = [f32; ENTRIES];

@@ -301,34 +301,41 @@ fn look<S: Simd>(
 /// Mean light over the hemispheres around these normals.
 #[inline(always)]
 fn spread(sky: &Sky, normals: &Columns, points: usize, to: &mut Columns) {
-    let in_studio = |i, up| studio::diffuse(studio::from_world(up, get(normals, i)));
-    find_light(sky, points, to, in_studio, |sky| sky.diffuse(Vec3::Z));
+    match sky.studio() {
+        Some(UpAxis::Y) => {
+            for i in 0..points.min(POINTS) {
+                put(to, i, studio::diffuse(studio::from_world(UpAxis::Y, get(normals, i))));
+            }
+        }
+        Some(UpAxis::Z) => {
+            for i in 0..points.min(POINTS) {
+                put(to, i, studio::diffuse(studio::from_world(UpAxis::Z, get(normals, i))));
+            }
+        }
+        None => fill(to, points, sky.diffuse(Vec3::Z)),
+    }
 }
 
 /// Mean light around these mirrored directions, as far as the roughness says.
 #[inline(always)]
 fn blur(sky: &Sky, roughness: impl Fn(usize) -> f32, dirs: &Columns, points: usize, to: &mut Columns) {
-    let in_studio = |i, up| studio::blurred(studio::from_world(up, get(dirs, i)), roughness(i));
-    find_light(sky, points, to, in_studio, |sky| sky.radiance(Vec3::Z, 0.0));
+    match sky.studio() {
+        Some(UpAxis::Y) => {
+            for i in 0..points.min(POINTS) {
+                put(to, i, studio::blurred(studio::from_world(UpAxis::Y, get(dirs, i)), roughness(i)));
+            }
+        }
+        Some(UpAxis::Z) => {
+            for i in 0..points.min(POINTS) {
+                put(to, i, studio::blurred(studio::from_world(UpAxis::Z, get(dirs, i)), roughness(i)));
+            }
+        }
+        None => fill(to, points, sky.radiance(Vec3::Z, 0.0)),
+    }
 }
 
-/// The light of a studio that is this way up at each point, or that of surroundings which look alike in all directions. Which
-/// it is is asked outside the loops.
+/// The same for every point: such surroundings look alike in all directions.
 #[inline(always)]
-fn find_light(
-    sky: &Sky,
-    points: usize,
-    to: &mut Columns,
-    in_studio: impl Fn(usize, UpAxis) -> Vec3,
-    alike: impl Fn(&Sky) -> Vec3,
-) {
-    let points = 0..points.min(POINTS);
-    match sky.studio() {
-        Some(UpAxis::Y) => points.for_each(|i| put(to, i, in_studio(i, UpAxis::Y))),
-        Some(UpAxis::Z) => points.for_each(|i| put(to, i, in_studio(i, UpAxis::Z))),
-        None => {
-            let radiance = alike(sky);
-            points.for_each(|i| put(to, i, radiance));
-        }
-    }
+fn fill(to: &mut Columns, points: usize, radiance: Vec3) {
+    (0..points.min(POINTS)).for_each(|i| put(to, i, radiance));
 }

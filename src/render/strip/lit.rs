@@ -10,7 +10,7 @@ use crate::math::Vec3;
 use crate::math::simd::{Kernel, Simd};
 use crate::render::beside::Traced;
 use crate::render::curve::STEEP;
-use crate::render::shade::{Incident, LocalLight, Matter, MetalRoughMatter, Model, PhongMatter, terminator, way};
+use crate::render::shade::{Incident, LocalLight, Matter, Model, PhongMatter, terminator, way};
 use crate::render::shadow::{Bound, Shadows};
 use crate::render::wave::Media;
 
@@ -60,11 +60,36 @@ impl Strip {
         light: &LocalLight,
         place: Option<u32>,
     ) {
-        match place {
-            None => self.run_shine::<false>((matter, shiny, has_inside), light, place),
-            Some(_) => self.run_shine::<true>((matter, shiny, has_inside), light, place),
+        let (found, lit, points) = (&self.found, &mut self.lit, padded(self.count));
+        let (painted, whole) = (&self.painted, &self.whole);
+        let cones = shiny.then_some(&self.cones);
+        let drawn = place.map(|place| (&mut self.drawn, place));
+        match drawn {
+            None => self.level.run(Shine::<false> {
+                found,
+                lit,
+                points,
+                matter,
+                painted,
+                whole,
+                cones,
+                has_inside,
+                light,
+                drawn,
+            }),
+            Some(_) => self.level.run(Shine::<true> {
+                found,
+                lit,
+                points,
+                matter,
+                painted,
+                whole,
+                cones,
+                has_inside,
+                light,
+                drawn,
+            }),
         }
-        let points = padded(self.count);
         if let Some(weights) = &self.weights {
             self.level.run(Weigh { weights, radiance: &mut self.lit.radiance, points });
         }
@@ -80,20 +105,6 @@ impl Strip {
                 self.lit.seen[i] *= u32::from(radiance.is_finite() & (radiance.max_element() > 0.0));
             }
         }
-    }
-
-    fn run_shine<const WIDE: bool>(
-        &mut self,
-        (matter, shiny, has_inside): (&Matter, bool, bool),
-        light: &LocalLight,
-        place: Option<u32>,
-    ) {
-        let (found, lit, points) = (&self.found, &mut self.lit, padded(self.count));
-        let (painted, whole) = (&self.painted, &self.whole);
-        let cones = shiny.then_some(&self.cones);
-        let drawn = place.map(|place| (&mut self.drawn, place));
-        let shine = Shine::<WIDE> { found, lit, points, matter, painted, whole, cones, has_inside, light, drawn };
-        self.level.run(shine);
     }
 
     /// The points that it shines on: the sample of each, and what it shows.
@@ -254,16 +265,27 @@ impl<const WIDE: bool> Kernel for Shine<'_, WIDE> {
             }
             Model::MetalRough(m) => {
                 let m = *m;
-                let painted_at = |i| painted.metal_rough(i, &m);
-                match (painted.any, cones.map(|cones| &cones.least_square)) {
-                    (true, Some(least)) => {
-                        reflect_metal_rough(found, lit, points, has_inside, |i| painted_at(i).at_least(least[i]));
+                match (painted.any, cones) {
+                    (true, Some(cones)) if has_inside => reflect(found, lit, points, |i, normal, view, to_light| {
+                        let m = painted.metal_rough(i, &m).at_least(cones.least_square[i]);
+                        m.lit_on_side(normal, view, to_light, found.front[i] == 1)
+                    }),
+                    (false, Some(cones)) if has_inside => reflect(found, lit, points, |i, normal, view, to_light| {
+                        let m = m.at_least(cones.least_square[i]);
+                        m.lit_on_side(normal, view, to_light, found.front[i] == 1)
+                    }),
+                    (true, Some(cones)) => reflect(found, lit, points, |i, normal, view, to_light| {
+                        painted.metal_rough(i, &m).at_least(cones.least_square[i]).lit(normal, view, to_light)
+                    }),
+                    (true, None) => reflect(found, lit, points, |i, normal, view, to_light| {
+                        painted.metal_rough(i, &m).lit(normal, view, to_light)
+                    }),
+                    (false, Some(cones)) => reflect(found, lit, points, |i, normal, view, to_light| {
+                        m.at_least(cones.least_square[i]).lit(normal, view, to_light)
+                    }),
+                    (false, None) => {
+                        reflect(found, lit, points, |_, normal, view, to_light| m.lit(normal, view, to_light));
                     }
-                    (true, None) => reflect_metal_rough(found, lit, points, has_inside, painted_at),
-                    (false, Some(least)) => {
-                        reflect_metal_rough(found, lit, points, has_inside, |i| m.at_least(least[i]));
-                    }
-                    (false, None) => reflect_metal_rough(found, lit, points, has_inside, |_| m),
                 }
             }
         }
@@ -340,24 +362,6 @@ fn reflect(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(usize, Ve
         let smooth = terminator(horizon, normal, to_light);
         let radiance = share(i, normal, get(&found.view, i), to_light) * get(&lit.light, i) * smooth;
         keep(found, lit, i, (radiance, above), above);
-    }
-}
-
-/// What metallic-rough points reflect; whether the side counts is asked outside the loops.
-#[inline(always)]
-fn reflect_metal_rough(
-    found: &Found,
-    lit: &mut Lit,
-    points: usize,
-    has_inside: bool,
-    matter: impl Fn(usize) -> MetalRoughMatter,
-) {
-    if has_inside {
-        reflect(found, lit, points, |i, normal, view, to_light| {
-            matter(i).lit_on_side(normal, view, to_light, found.front[i] == 1)
-        });
-    } else {
-        reflect(found, lit, points, |i, normal, view, to_light| matter(i).lit(normal, view, to_light));
     }
 }
 
