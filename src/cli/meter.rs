@@ -10,7 +10,7 @@ use super::camera::Choice;
 use crate::image::Picture;
 use crate::image::tone::luminance;
 use crate::render::{Job, Sampling, Settings, render};
-use crate::scene::features::Features;
+use crate::scene::features::is_unlit;
 use crate::scene::{MAX_STOPS, Scene};
 use std::time::Instant;
 
@@ -59,7 +59,7 @@ impl Metered {
 
 /// Whether the exposure of a scene's pictures is to be found: it has lamps that are measured, and something answers to them.
 pub(super) fn is_due(scene: &Scene) -> bool {
-    scene.photometric && !Features::of(scene).is_unlit()
+    scene.photometric && !is_unlit(scene)
 }
 
 /// Stops to add, 0 where the scene is to be shown as it is; `None` where nothing is lit.

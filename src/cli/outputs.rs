@@ -27,7 +27,7 @@ impl Target {
     /// The same, but of what lies in one of these folders only a picture that meshray wrote is replaced.
     pub(super) fn spares_beside(self, folders: &HashSet<PathBuf>) -> Self {
         match self {
-            Self::Named(path) if folders.contains(&folder_of(&path)) => Self::Default(path),
+            Self::Named(path) if !folders.is_empty() && folders.contains(&folder_of(&path)) => Self::Default(path),
             other => other,
         }
     }
@@ -41,10 +41,11 @@ impl Target {
     }
 }
 
-/// The folder of a file, in one spelling.
+/// The folder of a file, in one spelling, through symbolic links too.
 pub(super) fn folder_of(file: &Path) -> PathBuf {
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    lexical(&absolute(folder).unwrap_or_else(|_| folder.to_path_buf()))
+    let written = || lexical(&absolute(folder).unwrap_or_else(|_| folder.to_path_buf()));
+    folder.canonicalize().unwrap_or_else(|_| written())
 }
 
 /// The folder that may be made for a picture, in one that is there, and below which others may, if there is one.

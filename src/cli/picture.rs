@@ -7,7 +7,7 @@ use super::outputs::{self, Target};
 use crate::image::{ExrSamples, FileKind, Metadata, Output, Picture, PngDepth, ToneMap, encode};
 use crate::load::Diagnostic;
 use crate::render::{Sampling, Settings};
-use crate::scene::features::Features;
+use crate::scene::features::is_unlit;
 use crate::scene::{Background, Environment, Scene};
 use std::io::{self, Write};
 
@@ -61,7 +61,7 @@ impl Effective {
 /// make room for highlights, and what is unlit has none, and means its colours as they are.
 pub(super) fn tone_map(typed: Option<ToneMap>, scene: &Scene) -> Result<ToneMap, String> {
     let hinted = scene.hints.tone_map.as_deref().map(str::parse::<ToneMap>).transpose().map_err(|e| e.to_string())?;
-    let usual = || if Features::of(scene).is_unlit() { ToneMap::None } else { ToneMap::default() };
+    let usual = || if is_unlit(scene) { ToneMap::None } else { ToneMap::default() };
     Ok(typed.or(hinted).unwrap_or_else(usual))
 }
 

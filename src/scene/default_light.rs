@@ -6,7 +6,7 @@
 //! A file with lamps of its own keeps them as they are, without key and fill. Whether the studio surrounds them is the
 //! loader's choice: glTF has no word for surroundings, so it does there and metals are not black; a scene file says.
 
-use super::features::Features;
+use super::features::is_unlit;
 use super::{Camera, Environment, Light, LightKind, Scene};
 use crate::math::{DVec3, Vec3};
 
@@ -56,7 +56,7 @@ pub fn judged(scene: &Scene) -> DefaultLight {
     if !scene.lights.is_empty() || scene.ambient != Vec3::ZERO || own_environment {
         return DefaultLight::NotMissing;
     }
-    if Features::of(scene).is_unlit() { DefaultLight::NotNeeded } else { DefaultLight::Added }
+    if is_unlit(scene) { DefaultLight::NotNeeded } else { DefaultLight::Added }
 }
 
 /// A directional light that comes from `from` in camera space.

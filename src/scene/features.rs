@@ -185,7 +185,7 @@ impl Features {
     pub fn of(scene: &Scene) -> Self {
         let mut features = Self::default();
         features.add_geometry(scene);
-        for material in used_materials(scene) {
+        for material in used_materials(scene).collect::<BTreeSet<u32>>() {
             if let Some(material) = scene.materials.get(material as usize) {
                 features.add_material(material);
             }
@@ -197,11 +197,6 @@ impl Features {
     /// Whether the scene needs `feature`.
     pub fn has(&self, feature: Feature) -> bool {
         self.present.contains(&feature)
-    }
-
-    /// Whether nothing answers to light: all is shown in the colours that it has.
-    pub fn is_unlit(&self) -> bool {
-        self.has(Feature::Unlit) && !self.has(Feature::MetalRough) && !self.has(Feature::Phong)
     }
 
     /// What the scene needs, in the order of [`Feature::ALL`].
@@ -314,13 +309,20 @@ fn has_faces(mesh: &Mesh) -> bool {
     !mesh.triangles.is_empty() || !mesh.polygons.is_empty()
 }
 
-/// Indices of the materials of everything that can be hit.
-fn used_materials(scene: &Scene) -> BTreeSet<u32> {
+/// Whether nothing in the scene answers to light: all that can be hit is shown in the colours that it has. Asked of most scenes
+/// it looks at one material.
+pub fn is_unlit(scene: &Scene) -> bool {
+    let mut materials = used_materials(scene).filter_map(|material| scene.materials.get(material as usize)).peekable();
+    materials.peek().is_some() && materials.all(|material| matches!(material.reflection, Reflection::Unlit))
+}
+
+/// Indices of the materials of everything that can be hit, some several times.
+fn used_materials(scene: &Scene) -> impl Iterator<Item = u32> {
     let placed = scene.instances.iter().filter_map(|instance| scene.meshes.get(instance.mesh as usize));
     let meshes = placed.filter(|mesh| has_faces(mesh)).map(|mesh| mesh.material);
     let spheres = scene.spheres.iter().map(|sphere| sphere.material);
     let cones = scene.cones.iter().map(|cone| cone.material);
-    meshes.chain(spheres).chain(cones).chain(scene.planes.iter().map(|plane| plane.material)).collect()
+    meshes.chain(spheres).chain(cones).chain(scene.planes.iter().map(|plane| plane.material))
 }
 
 #[cfg(test)]
@@ -333,6 +335,16 @@ mod tests {
         let sphere = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 };
         let material = Material { reflection, ..Material::default() };
         Scene { spheres: vec![sphere], materials: vec![material], ..Scene::default() }
+    }
+
+    #[test]
+    fn a_scene_is_unlit_where_all_that_can_be_hit_is() {
+        let mut scene = ball(Reflection::Unlit);
+        assert!(is_unlit(&scene) && !is_unlit(&Scene::default()));
+        scene.materials.push(Material::plain());
+        assert!(is_unlit(&scene), "the other is on nothing");
+        scene.spheres.push(Sphere { material: 1, ..scene.spheres[0].clone() });
+        assert!(!is_unlit(&scene));
     }
 
     #[test]

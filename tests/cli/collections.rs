@@ -230,6 +230,12 @@ fn no_picture_replaces_what_another_model_shows_neither_side_by_side_nor_when_th
     // Beside a model none is replaced that meshray did not write, read or not.
     let folder = folder.file("m/b.png", "mine");
     folder.render(&["m/b.obj", "m/z1.obj", "-o", "m/{stem}.png"]).ends(1).says(&["m/b.png: exists and is no picture"]);
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("m", folder.path("l")).unwrap();
+        let words = ["m/b.obj", "m/z1.obj", "-o", "l/{stem}.png"];
+        folder.render(&words).ends(1).says(&["l/b.png: exists and is no picture"]);
+    }
     assert!(folder.read("m/b.png") == b"mine" && folder.has("m/z1.png"));
 }
 

@@ -12,7 +12,7 @@ use super::shade::{Lobe, Seen};
 use super::studio;
 use crate::image::ToneMap;
 use crate::math::Vec3;
-use crate::scene::features::Features;
+use crate::scene::features::is_unlit;
 use crate::scene::{Background, Environment, Scene, UpAxis};
 use chance::Chance;
 use panorama::Pyramid;
@@ -52,7 +52,7 @@ impl Sky {
             let chance = Chance::new(&pyramid);
             Map { pyramid, chance, turn: libm::sincosf(panorama.rotation) }
         });
-        let is_toned = Features::of(scene).is_unlit();
+        let is_toned = is_unlit(scene);
         Self { environment: scene.environment, up: scene.up, backdrop, is_toned, map }
     }
 
