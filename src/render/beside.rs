@@ -211,7 +211,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let i = index as usize;
             let (ray, path, hit) = (&wave.rays[i], &wave.paths[i], &wave.hits[i]);
             if !hit.is_some() {
-                if path.straight { self.leave(ray, path) } else { self.beside.missed.push(index) }
+                if path.straight || path.calm { self.leave(ray, path) } else { self.beside.missed.push(index) }
             } else if self.is_crossed(wave, i) {
                 self.continuing[class as usize].push_behind(*ray, *path, *hit);
             } else if rays.len() < FEW || !sorted.take(context, (index, 1), hit.prim) {

@@ -2,6 +2,7 @@
 
 use super::context::Context;
 use super::draws::{Purpose, Spread};
+use super::glare::Calm;
 use super::glint::{self, MIRROR};
 use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};
@@ -105,15 +106,26 @@ impl<G: Ground> Point<'_, G> {
     fn bounced(&self, context: &Context, weight: Vec3, factor: f32) -> Path {
         let depth = self.path.depth + 1;
         let cone_spread = glint::behind(self.surface.bend(context), self.path.cone_spread, factor);
-        Path { weight, depth, straight: false, since: 0.0, cone_width: self.width, cone_spread, ..self.path }
+        Path {
+            weight,
+            depth,
+            straight: false,
+            calm: false,
+            since: 0.0,
+            cone_width: self.width,
+            cone_spread,
+            ..self.path
+        }
     }
 }
 
 /// The facets that stand in for a rough surface.
-struct Rough {
-    lobe: Lobe,
-    rays: u32,
+pub(super) struct Rough {
+    pub lobe: Lobe,
+    pub rays: u32,
     spread: Spread,
+    /// Whether rays that it mirrors, and those that it lets through, see no glare.
+    calm: Calm,
 }
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
@@ -153,7 +165,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     /// Whether light that is let in here has all its wavelengths still, and loses sight of some.
-    fn splits<G>(&self, point: &Point<G>) -> bool {
+    pub(super) fn splits<G>(&self, point: &Point<G>) -> bool {
         let disperses = point.matter.refraction().is_some_and(|(_, dispersion)| dispersion > 0.0);
         disperses && point.matter.lets_light_in() && point.path.band.is_none()
     }
@@ -161,12 +173,14 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     /// Spreads rays over what a rough surface mirrors and lets through: several off the first, one off what those find.
     fn spread<G: Ground>(&mut self, point: &Point<G>, crossing: &Crossing, lobe: Lobe) {
         let rays = if point.path.depth == 0 { self.context.gloss.rays } else { 1 };
+        self.by_chance.get_mut(point.ray.sample as usize).into_iter().for_each(|by_chance| *by_chance = true);
         // The same facets mirror and let through, so that nothing is lost between both.
         let splits = self.splits(point);
         #[expect(clippy::cast_possible_truncation, reason = "a handful")]
         let points = if splits { rays.max(self.context.bands.len() as u32) } else { rays };
         let spread = self.draws(point, Purpose::Facets).spread(points);
-        let mut rough = Rough { lobe, rays, spread };
+        let mut rough = Rough { lobe, rays, spread, calm: Calm::default() };
+        rough.calm = self.ask_for_glare(point, crossing, &rough);
         self.send_lacquer(point);
         for k in 0..rays {
             self.send_off_facet(point, crossing, &rough, k);
@@ -197,6 +211,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let weight = point.path.weight * share * (1.0 / rough.rays as f32);
             self.send_spread(point, above(to, geometric), RayClass::Reflected, rough, |path| Path {
                 weight,
+                calm: rough.calm.mirrored,
                 ..path.turned(RayClass::Reflected, k + 1)
             });
         }
@@ -235,6 +250,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             band,
             media,
             straight,
+            calm: rough.calm.through,
             ..path.turned(RayClass::Refracted, k + 1)
         });
     }

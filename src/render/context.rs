@@ -4,11 +4,12 @@ use super::Settings;
 use super::absorption::Absorption;
 use super::certainty;
 use super::clearings::{Before, Clearings, Cones};
+use super::fireflies::Fireflies;
 use super::frame::sample_width;
 use super::glint;
 use super::observer::Observer;
 use super::sampling::Sampling;
-use super::shade::{Band, LocalLight, bands};
+use super::shade::{Band, LocalLight, bands, has_inside};
 use super::sky::Sky;
 use super::strip::Common;
 use super::texture::TextureStore;
@@ -71,6 +72,10 @@ pub(crate) struct Context<'a> {
     pub light_rays: u32,
     /// Rays that rough surfaces spread.
     pub gloss: Gloss,
+    /// Whether rays may be spread by chance.
+    pub meets_by_chance: bool,
+    /// What such rays were found to meet seldom, and far brighter than all else, if anybody has looked.
+    pub fireflies: Option<Arc<Fireflies>>,
     /// How far highlights are spread, in widths of a ray's cone.
     pub highlight_reach: f32,
     /// For every random choice.
@@ -121,6 +126,11 @@ impl Gloss {
     pub(crate) fn spreads(self, material: &Material) -> bool {
         self.all || self.rays > 0 && material.reflection.transmits()
     }
+
+    /// Whether it does, and is rough in some place.
+    fn spreads_far(self, material: &Material) -> bool {
+        self.spreads(material) && material.metal_rough().is_some_and(|m| m.roughness > 0.0 || m.grain.is_some())
+    }
 }
 
 impl<'a> Context<'a> {
@@ -130,7 +140,12 @@ impl<'a> Context<'a> {
         let together = samples_together(settings);
         let gloss = Gloss::new(settings.gloss_rays).shared_by(together).of_samples(settings);
         let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, gloss.all, settings.cutoff));
-        let sky = Arc::new(Sky::new(scene));
+        let meets_by_chance = |m: &Material| gloss.spreads_far(m);
+        let meets_by_chance = depth > 0 && scene.materials.iter().any(meets_by_chance);
+        let mut sky = Sky::new(scene);
+        if meets_by_chance {
+            sky.find_glare();
+        }
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
         let ways = ways_around(sky.is_map(), features.has(Feature::Translucence), features.has(Feature::MetalRough));
         let env_rays = shared_env_rays(env_rays, together, ways);
@@ -144,10 +159,12 @@ impl<'a> Context<'a> {
             world,
             textures,
             is_dark: sky.is_dark() && scene.ambient == Vec3::ZERO,
-            sky,
+            sky: Arc::new(sky),
             env_rays,
             light_rays,
             gloss,
+            meets_by_chance: settings.lens.is_some() || meets_by_chance,
+            fireflies: None,
             highlight_reach: glint::reach(settings),
             seed: settings.seed,
             points_at_a_time: points_at_a_time(&lights, light_rays, env_rays, gloss),
@@ -192,6 +209,11 @@ impl<'a> Context<'a> {
         Self { seed: settings.seed, highlight_reach, gloss, ..self.clone() }
     }
 
+    /// Whether light that passes this material goes on another way, or many.
+    pub(super) fn turns(&self, material: &Material) -> bool {
+        material.reflection.transmits() && (has_inside(material) || self.gloss.spreads_far(material))
+    }
+
     /// A prim and its material.
     pub(super) fn face(&self, prim: u32) -> (Prim<'_>, u32) {
         (self.world.prim(prim), self.world.material(self.scene, prim))
@@ -210,6 +232,13 @@ impl<'a> Context<'a> {
     /// Whether a branch of this weight is worth its rays, where it is such a part of what was spread.
     pub(crate) fn is_alive(&self, weight: Vec3, part: f32) -> bool {
         weight.max_element() >= self.cutoff_of(part)
+    }
+
+    /// Whether light is worth a shadow ray, where it is such a part of what was spread: much less than a weight, as it is what is
+    /// seen in the end.
+    pub(crate) fn is_worth_a_ray(&self, light: Vec3, part: f32) -> bool {
+        const PART: f32 = 1.0 / 16.0;
+        light.max_element() >= PART * self.cutoff_of(part)
     }
 
     /// No branch of less weight is.

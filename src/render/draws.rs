@@ -45,6 +45,7 @@ pub(crate) enum Purpose {
     Surroundings,
     Roulette,
     Shadows,
+    Glare,
 }
 
 impl Draws {

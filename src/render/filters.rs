@@ -31,10 +31,10 @@ pub(super) struct Inside {
 }
 
 /// Weakens light by what a surface lets through at the hit that comes next on its way, behind one that was `crossed`, which it
-/// replaces unless it is a hole.
+/// replaces unless it is a hole. What is to arrive unbent ends at what would turn it.
 pub(super) fn weaken(
     context: &Context,
-    ray: &Ray,
+    (ray, is_unbent): (&Ray, bool),
     crossed: &mut Hit,
     Passed { hit, left }: &Passed,
     light: &mut Vec3,
@@ -45,7 +45,10 @@ pub(super) fn weaken(
         Some(part) => (Vec3::splat(part), false),
         None => {
             let target = Target::new(context.scene, context.world, hit.prim);
-            let filter = filter_at(context, &target, ray, hit, inside.filter(|_| !is_repeated));
+            let filter = match is_unbent && context.turns(target.material) {
+                true => Vec3::ZERO,
+                false => filter_at(context, &target, ray, hit, inside.filter(|_| !is_repeated)),
+            };
             let may_have_holes = !target.material.reflection.transmits() && hit.prim < context.world.triangles();
             (filter, may_have_holes && filter == Vec3::ONE)
         }

@@ -3,9 +3,10 @@
 use super::context::Context;
 use super::part::{Measure, Part, Quiet, squared_errors, squares};
 use super::sampling::Sampling;
-use super::target;
 use super::{Job, Progress, Settings};
+use super::{fireflies, target};
 use crate::accel::{NoProbe, RayCounts};
+use crate::stopwatch::Stopwatch;
 
 /// A number that was estimated, and what it lies between with 95 % confidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +65,10 @@ pub struct Forecast {
 /// Foretells the rendering of a job from about a hundredth of its pixels, at least some thousands: rendered twice, with
 /// different random numbers. `None` when cancelled.
 pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
-    let context = Context::new(job.scene, job.world, job.textures, job.settings);
+    let mut context = Context::new(job.scene, job.world, job.textures, job.settings);
+    let watch = Stopwatch::of_all_threads();
+    let (looked, _) = fireflies::look::<NoProbe>(job, &mut context, &Quiet(progress));
+    let spent = watch.read().cpu.as_secs_f64();
     // What is asked for as an error is first found out how to reach; the rendering will do that again.
     let (settings, work, before) = match job.settings.sampling {
         Sampling::Stochastic(how) if how.target.is_some() => {
@@ -73,6 +77,7 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
         }
         _ => (job.settings.clone(), 1.0, (0.0, 0.0)),
     };
+    let before = (before.0 + looked as f64, before.1 + if looked > 0 { spent } else { 0.0 });
     let squares = squares(settings.width, settings.height);
     let timed = Part::<NoProbe>::render(job, &context, &settings, &squares, progress)?;
     let other = Settings { seed: target::seed(settings.seed, 1), ..settings.clone() };

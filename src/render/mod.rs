@@ -25,9 +25,11 @@ mod draws;
 pub mod everything;
 mod eyes;
 mod filters;
+mod fireflies;
 mod footing;
 mod forecast;
 mod frame;
+mod glare;
 mod glint;
 mod immersion;
 mod keeping;
@@ -253,14 +255,19 @@ fn render_with<P: Observer>(
     prepared: impl FnOnce(),
 ) -> (Rendered, Vec<ByClass<P>>) {
     let settings = job.settings;
-    let context = Context::new(job.scene, job.world, job.textures, settings);
+    let mut context = Context::new(job.scene, job.world, job.textures, settings);
     prepared();
-    if let Sampling::Stochastic(how) = &settings.sampling
-        && how.target.is_some()
-        && let Some(done) = target::render(job, &context, how, progress)
-    {
-        return done;
+    let (rays, more) = fireflies::look(job, &mut context, progress);
+    let (mut rendered, mut counts) = match &settings.sampling {
+        Sampling::Stochastic(how) if how.target.is_some() => target::render(job, &context, how, progress),
+        _ => None,
     }
-    let (picture, sampled, counts, complete) = tile::render_tiles(&context, job.accel, job.view, settings, progress);
-    (Rendered { picture, counts: ClassCounts::default(), sampled, depth: context.depth, complete }, counts)
+    .unwrap_or_else(|| {
+        let (picture, sampled, counts, complete) =
+            tile::render_tiles(&context, job.accel, job.view, settings, progress);
+        (Rendered { picture, counts: ClassCounts::default(), sampled, depth: context.depth, complete }, counts)
+    });
+    rendered.sampled.rays += rays;
+    counts.extend(more);
+    (rendered, counts)
 }

@@ -20,6 +20,8 @@ pub(crate) struct Shadows {
     light: Tail<Bound>,
     /// What each is inside of; empty where nothing absorbs light.
     inside: Vec<Inside>,
+    /// Whether they end at what would bend or spread them.
+    is_unbent: bool,
     /// The ways up to where some of the rays start, and which those are.
     risers: Vec<Ray>,
     raised: Vec<usize>,
@@ -46,6 +48,11 @@ pub(crate) struct Bound {
 }
 
 impl Shadows {
+    /// For rays that end at what would bend or spread them.
+    pub(crate) fn unbent() -> Self {
+        Self { is_unbent: true, ..Self::default() }
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.rays.len()
     }
@@ -140,7 +147,7 @@ impl Shadows {
             met.list(noted, &mut self.in_order);
             let (light, mut crossed) = (&mut self.light[i].radiance, Hit::MISS);
             for passed in &self.in_order {
-                weaken(context, &self.rays[i], &mut crossed, passed, light, self.inside.get_mut(i));
+                weaken(context, (&self.rays[i], self.is_unbent), &mut crossed, passed, light, self.inside.get_mut(i));
                 self.blocked[i] = is_dark(*light);
                 if self.blocked[i] {
                     break;
@@ -216,7 +223,7 @@ impl Shadows {
                 continue;
             }
             let (ray, light, mut crossed) = (self.on_way[k], &mut self.light[i].radiance, self.crossed[k]);
-            weaken(context, &ray, &mut crossed, &hit.into(), light, self.inside.get_mut(i));
+            weaken(context, (&ray, self.is_unbent), &mut crossed, &hit.into(), light, self.inside.get_mut(i));
             self.blocked[i] = is_dark(*light);
             if self.blocked[i] {
                 continue;

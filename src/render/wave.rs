@@ -35,6 +35,8 @@ pub(crate) struct Path {
     pub depth: u32,
     /// Whether the ray still runs along the line of sight, so that what lies behind shows through.
     pub straight: bool,
+    /// Whether the glare of the sky was asked for where it was spread, so that it sees none.
+    pub calm: bool,
     /// Of a ray that goes on behind a hit, what it crossed last, where that was no hole; [`Hit::MISS`]: nothing.
     pub crossed: Hit,
     /// The part of the spectrum this ray carries, once dispersion has split it.
@@ -61,6 +63,7 @@ impl Path {
             part: 1.0,
             depth: 0,
             straight: true,
+            calm: false,
             crossed: Hit::MISS,
             band: None,
             media,

@@ -60,12 +60,16 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     wave: Wave,
     pub(super) beside: Beside,
     pub(super) shadows: Shadows,
+    /// Rays to the glare of the sky.
+    pub(super) glares: Shadows,
     arounds: Arounds,
     pub samples: Vec<Sample>,
     /// The place of each sample among those of its pixel; empty where only rays decide random choices.
     pub streams: Vec<Stream>,
     /// Which branches go on by chance.
     pub roulette: Roulette,
+    /// Whether rays of each sample were spread by chance; empty where none may be.
+    pub by_chance: Vec<bool>,
     /// The first surface of each sample; empty unless layers are wanted.
     pub firsts: Vec<FirstSurface>,
     pub counts: ByClass<P>,
@@ -82,10 +86,12 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             wave: Wave::default(),
             beside: Beside::default(),
             shadows: Shadows::default(),
+            glares: Shadows::unbent(),
             arounds: Arounds::default(),
             samples: Vec::new(),
             streams: Vec::new(),
             roulette: Roulette::default(),
+            by_chance: Vec::new(),
             firsts: Vec::new(),
             counts: ByClass::default(),
         }
@@ -101,10 +107,13 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.counts.each_mut().into_iter().for_each(|probe| probe.batch(samples));
         self.starting.iter_mut().chain(&mut self.continuing).for_each(Queue::clear);
         self.shadows.clear();
+        self.glares.clear();
         self.arounds.clear();
         self.eyes.clear();
         self.streams.clear();
         self.roulette = Roulette::default();
+        self.by_chance.clear();
+        self.by_chance.resize(if self.context.meets_by_chance { samples } else { 0 }, false);
         self.samples.clear();
         self.samples.resize(samples, Sample::default());
         self.firsts.clear();
@@ -195,13 +204,17 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if self.shadows.len() > 0 {
             self.shadows.trace(self.context, &mut self.asking, &mut self.counts.shadow, &mut arrive);
         }
+        if self.glares.len() > 0 {
+            self.glares.trace(self.context, &mut self.asking, &mut self.counts.shadow, &mut arrive);
+        }
         self.arounds.trace(self.context, &mut self.asking, &mut self.counts.shadow, arrive);
     }
 
     /// Traces shadow rays once many wait. In between a sample sees one point at most, so that in whatever order these are
     /// shaded, what comes of the rays is added to the same.
     pub(super) fn relieve(&mut self) {
-        if self.shadows.len() >= SHADOW_LIMIT || self.arounds.len() >= AROUND_LIMIT {
+        if self.shadows.len() >= SHADOW_LIMIT || self.glares.len() >= SHADOW_LIMIT || self.arounds.len() >= AROUND_LIMIT
+        {
             self.trace_shadows();
         }
     }
@@ -214,7 +227,11 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             return;
         }
         let (dir, sky) = (ray.dir.try_normalize().unwrap_or(Vec3::Z), &self.context.sky);
-        let seen = if path.straight { sky.behind(dir, path.cone_spread) } else { sky.radiance(dir, path.cone_spread) };
+        let seen = match path.straight {
+            _ if path.calm => sky.calm(dir, path.cone_spread),
+            true => sky.behind(dir, path.cone_spread),
+            false => sky.radiance(dir, path.cone_spread),
+        };
         sample.radiance += path.weight * seen;
     }
 
@@ -226,6 +243,10 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let (before, path) = (path, lessened.as_ref().unwrap_or(path));
         let target = Target::new(context.scene, context.world, hit.prim);
         let material = target.material;
+        // Rays to glare end at what would turn them.
+        let seeing = path.calm && context.turns(material);
+        let (before, path) =
+            (&Path { calm: before.calm && !seeing, ..*before }, &Path { calm: path.calm && !seeing, ..*path });
         let width = path.cone_width + path.cone_spread * hit.t;
         let mut surface = Surface::new(context.world, target, ray, hit, width);
 

@@ -64,6 +64,11 @@ pub(in crate::render) struct Even {
 }
 
 impl Even {
+    /// What it looks like is no proof for the sample at this place.
+    pub(in crate::render) fn doubt(&mut self, i: usize) {
+        self.is_uneven[i] = 1;
+    }
+
     /// Whether the sample at a place looks as all beside it do.
     pub(in crate::render) fn is_even(&self, i: usize) -> bool {
         self.is_uneven[i] == 0

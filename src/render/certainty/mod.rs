@@ -89,6 +89,18 @@ impl<'a> Certainty<'a> {
         above.min(below) < 3
     }
 
+    /// What grey light as bright as this lies between, after exposure.
+    pub(super) fn range_of(&self, light: f32) -> Range {
+        let grey = light / self.gain;
+        let color = match &self.developer {
+            Some(developer) => Vec4::from_array(developer.coded([grey, grey, grey, 1.0])),
+            None => Vec4::new(grey, grey, grey, 1.0),
+        };
+        // It may show whatever covers the pixel.
+        let without_alpha = |alpha: f32| Vec4::new(color.x, color.y, color.z, alpha);
+        Range { least: without_alpha(f32::INFINITY), most: without_alpha(f32::NEG_INFINITY), brightest: light }
+    }
+
     /// The greatest channel of the light of any of these groups, after exposure.
     fn brightest(&self, groups: &[Sum]) -> f32 {
         groups.iter().map(|group| self.light(group)).fold(0.0, f32::max)

@@ -111,6 +111,17 @@ impl Lobe {
         Vec3::new(wide * v.dot(self.along), narrow * v.dot(self.across), v.dot(self.normal)).length()
     }
 
+    /// Whether a facet with this normal can be among them.
+    pub(crate) fn is_on_front(&self, facet: Vec3) -> bool {
+        facet.dot(self.normal) > 0.0
+    }
+
+    /// About how much of the sphere they spread over what they mirror, sr.
+    pub(crate) fn solid_angle(&self) -> f32 {
+        let [wide, narrow] = self.alpha;
+        4.0 * PI * wide * narrow
+    }
+
     /// Angle across the cone, radians, that each of so many rays stands for.
     pub(crate) fn angle(&self, rays: u32) -> f32 {
         let [wide, narrow] = self.alpha;

@@ -3,15 +3,15 @@
 //! A texel is drawn by its light and its area on the sphere, row first (M. Pharr, W. Jakob, G. Humphreys, "Physically Based
 //! Rendering", 3rd edition, 2016, section 14.2.4), and a direction evenly within it.
 
-use super::panorama::{Level, Pyramid};
+use super::panorama::Level;
 use crate::math::Vec3;
 use std::f32::consts::PI;
 
 /// Columns of the finest level that is told apart.
-const COLUMNS: u32 = 1024;
+pub(super) const COLUMNS: u32 = 1024;
 
 /// Share of the draws that go anywhere, so that what is dark is drawn too.
-const EVEN: f64 = 0.1;
+pub(super) const EVEN: f64 = 0.1;
 
 /// The distribution.
 #[derive(Clone, Debug)]
@@ -26,9 +26,9 @@ pub(super) struct Chance {
 }
 
 impl Chance {
+    /// Of the light of a level, with an `even` share of draws that go anywhere.
     #[expect(clippy::cast_possible_truncation, reason = "chances")]
-    pub(super) fn new(pyramid: &Pyramid) -> Self {
-        let level = pyramid.at_most(COLUMNS).clone();
+    pub(super) fn new(level: Level, even: f64) -> Self {
         let (width, height) = (level.width as usize, level.height as usize);
         let light = |row: u32| (0..level.width).map(move |x| (x, row));
         let lights: Vec<f64> = (0..level.height)
@@ -36,7 +36,7 @@ impl Chance {
             .map(|(x, row)| f64::from(level.texel(x, row).element_sum()) * f64::from(level.area(row)))
             .collect();
         let whole: f64 = lights.iter().sum();
-        let even = if whole > 0.0 { EVEN } else { 1.0 };
+        let even = if whole > 0.0 { even } else { 1.0 };
         let (mut rows, mut columns) = (Vec::with_capacity(height), Vec::with_capacity(width * height));
         let mut densities = Vec::with_capacity(width * height);
         let mut rows_sum = 0.0;
@@ -50,7 +50,7 @@ impl Chance {
             let sum: f64 = chances.iter().sum();
             let mut up_to = 0.0;
             for chance in &chances {
-                up_to += chance / sum;
+                up_to += if sum > 0.0 { chance / sum } else { 0.0 };
                 columns.push(up_to as f32);
                 densities.push((chance / area) as f32);
             }

@@ -3,6 +3,7 @@
 mod around;
 mod beyond;
 mod chance;
+mod glare;
 mod gloss;
 mod panorama;
 
@@ -15,6 +16,7 @@ use crate::math::Vec3;
 use crate::scene::features::is_unlit;
 use crate::scene::{Background, Environment, Scene, UpAxis};
 use chance::Chance;
+use glare::Glare;
 use panorama::Pyramid;
 
 /// Angle across of cones, radians, from which the studio is blurred, little by little up to twice that: where smooth surfaces
@@ -39,6 +41,8 @@ pub(crate) struct Sky {
 struct Map {
     pyramid: Pyramid,
     chance: Chance,
+    /// If it has any, and somebody has asked.
+    glare: Option<Glare>,
     /// Sine and cosine of its rotation about the up axis.
     turn: (f32, f32),
 }
@@ -49,8 +53,8 @@ impl Sky {
         let panorama = scene.panorama.as_ref().filter(|_| scene.environment == Environment::Panorama);
         let map = panorama.filter(|p| !p.texels.is_empty()).map(|panorama| {
             let pyramid = Pyramid::new(panorama);
-            let chance = Chance::new(&pyramid);
-            Map { pyramid, chance, turn: libm::sincosf(panorama.rotation) }
+            let chance = Chance::new(pyramid.at_most(chance::COLUMNS).clone(), chance::EVEN);
+            Map { pyramid, chance, glare: None, turn: libm::sincosf(panorama.rotation) }
         });
         let is_toned = is_unlit(scene);
         Self { environment: scene.environment, up: scene.up, backdrop, is_toned, map }

@@ -51,10 +51,7 @@ impl Pyramid {
     /// Of a panorama that has texels.
     pub(super) fn new(panorama: &Panorama) -> Self {
         let Panorama { width, height, texels, .. } = panorama;
-        let mut levels = vec![Level { width: *width, height: *height, texels: Arc::clone(texels) }];
-        while let Some(next) = levels.last().and_then(Level::halved) {
-            levels.push(next);
-        }
+        let levels = Level { width: *width, height: *height, texels: Arc::clone(texels) }.halves();
         let mut soft: Vec<Level> = Vec::new();
         for to in &levels[1..] {
             soft.push(soft.last().unwrap_or(&levels[0]).softened((to.width, to.height)));
@@ -63,6 +60,12 @@ impl Pyramid {
             Self { levels, soft, diffuse: Level { width: 1, height: 1, texels: Arc::new(vec![[0.0; 3]]) } };
         pyramid.diffuse = pyramid.spread();
         pyramid
+    }
+
+    /// For [`Self::radiance`] alone.
+    pub(super) fn sharp(level: Level) -> Self {
+        let nothing = Level { width: 1, height: 1, texels: Arc::new(vec![[0.0; 3]]) };
+        Self { levels: level.halves(), soft: Vec::new(), diffuse: nothing }
     }
 
     /// Radians across a texel.
@@ -191,6 +194,23 @@ impl Level {
     #[cfg(test)]
     pub(super) fn without_texels((width, height): (u32, u32)) -> Self {
         Self { width, height, texels: Arc::default() }
+    }
+
+    /// It and all that are half as large as the one before.
+    fn halves(self) -> Vec<Self> {
+        std::iter::successors(Some(self), Self::halved).collect()
+    }
+
+    /// Radiance and solid angle of each texel, row by row.
+    pub(super) fn each(&self) -> impl Iterator<Item = (Vec3, f32)> + '_ {
+        let row = move |row: u32| (0..self.width).map(move |column| (self.texel(column, row), self.area(row)));
+        (0..self.height).flat_map(row)
+    }
+
+    /// The same with other texels.
+    pub(super) fn with(&self, texel: impl Fn(Vec3) -> Vec3) -> Self {
+        let texels = self.texels.iter().map(|&light| texel(light.into()).to_array()).collect();
+        Self { texels: Arc::new(texels), ..*self }
     }
 
     /// Degrees of arc, in radians, that a texel is high.

@@ -196,7 +196,7 @@ impl Around {
             let (own, pixel) = (&self.seen[i], &mut pixels[i]);
             let (near, samples) = (self.near(self.at(pixel.at)), pixel.facts.count);
             let is_calm = |seen: Seen| judge.agree(&seen.range) && !judge.differ(own.color, seen.color, samples);
-            if samples < GROUPS as u32 && near.clone().all(is_calm) {
+            if samples < GROUPS as u32 && pixel.firefly == 0.0 && near.clone().all(is_calm) {
                 pixel.done(own.error);
             } else {
                 pixel.facts.error = own.error;

@@ -6,6 +6,7 @@ use super::pixel::Pixel;
 use super::places::Places;
 use crate::accel::Accel;
 use crate::render::certainty::{Pixels, Shown};
+use crate::render::fireflies::Fireflies;
 use crate::render::frame::Frame;
 use crate::render::layers::{FirstSurface, LayerPixel};
 use crate::render::observer::Observer;
@@ -17,6 +18,8 @@ pub(super) struct First {
     /// The parts, and the number of the first pixel of each.
     parts: Vec<(Tile, usize)>,
     samples: Vec<Sample>,
+    /// Whether rays of each were spread by chance; empty where none may be.
+    by_chance: Vec<bool>,
     /// What layers are made of; empty unless they are wanted.
     firsts: Vec<FirstSurface>,
     /// The pixels that they are.
@@ -38,23 +41,39 @@ impl Sampler<'_> {
             parts.push((tile, columns.len()));
             tile.list((&mut columns, &mut rows));
         }
-        let (mut samples, mut firsts) = (Vec::with_capacity(count), Vec::new());
+        let (mut samples, mut by_chance, mut firsts) = (Vec::with_capacity(count), Vec::new(), Vec::new());
         let mut places = Places::default();
         for some in columns.chunks(TOGETHER).zip(rows.chunks(TOGETHER)) {
             places.trace_first(self.frame, self.how, tracer, some)?;
             samples.extend_from_slice(&tracer.samples);
+            by_chance.extend_from_slice(&tracer.by_chance);
             firsts.extend_from_slice(&tracer.firsts);
         }
         let (shown, pixels) = self.judge.see_samples(&samples);
-        Some(First { parts, samples, firsts, pixels, shown })
+        Some(First { parts, samples, by_chance, firsts, pixels, shown })
     }
 }
 
 impl First {
+    /// Tells the pixels of a tile, of those that are among these, that may have missed a firefly.
+    pub(super) fn each_that_may_miss(
+        &self,
+        fireflies: Option<&Fireflies>,
+        tile: Tile,
+        mut tell: impl FnMut((u32, u32)),
+    ) {
+        let Some(fireflies) = fireflies.filter(|_| !self.by_chance.is_empty()) else { return };
+        for &(part, start) in self.parts.iter().filter(|(part, _)| part.meets(tile)) {
+            let each = part.places().zip(&self.by_chance[start..]).filter(|&(at, _)| tile.contains(at));
+            each.filter(|&(at, &by_chance)| by_chance && fireflies.at(at) > 0.0).for_each(|(at, _)| tell(at));
+        }
+    }
+
     /// Gives a pixel its first sample, if that is among these.
-    pub(super) fn give(&self, pixel: &mut Pixel) {
+    pub(super) fn give(&self, pixel: &mut Pixel, fireflies: Option<&Fireflies>) {
         let Some(&(part, start)) = self.parts.iter().find(|(part, _)| part.contains(pixel.at)) else { return };
         let own = start + part.number(pixel.at);
+        pixel.expect(fireflies, self.by_chance.get(own..=own).unwrap_or_default());
         pixel.take(&self.samples[own..=own], self.firsts.get(own..=own).unwrap_or_default(), 1);
     }
 

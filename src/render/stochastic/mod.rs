@@ -15,6 +15,8 @@ mod variances;
 
 use super::Settings;
 use super::certainty::{Certainty, GROUPS, SURE, output};
+use super::context::Context;
+use super::fireflies::Fireflies;
 use super::frame::Frame;
 use super::layers::LayerPixel;
 use super::observer::Observer;
@@ -28,7 +30,7 @@ use crate::scene::Background;
 use around::Around;
 use first::First;
 use pixel::Pixel;
-use places::Places;
+pub(in crate::render) use places::Places;
 pub(super) use shared::render_all;
 use std::ops::Range;
 
@@ -43,7 +45,7 @@ pub(super) fn render<A: Accel, P: Observer>(
     tile: Tile,
 ) -> Option<TilePixels> {
     let output = output(how.space, frame.background);
-    let sampler = Sampler::new(frame, how, output.as_ref(), tracer.context.scene.background);
+    let sampler = Sampler::new(frame, how, output.as_ref(), tracer.context);
     if !sampler.starts_with_one() {
         return sampler.finish(tracer, tile, &[]);
     }
@@ -60,6 +62,7 @@ struct Sampler<'a> {
     frame: &'a Frame<'a>,
     how: &'a Stochastic,
     judge: Certainty<'a>,
+    fireflies: Option<&'a Fireflies>,
     /// Samples of a pixel after each round.
     rounds: Vec<u32>,
 }
@@ -79,11 +82,12 @@ struct Course {
 }
 
 impl<'a> Sampler<'a> {
-    fn new(frame: &'a Frame, how: &'a Stochastic, output: Option<&'a Output>, background: Option<Background>) -> Self {
-        let transparent = matches!(background, None | Some(Background::Transparent));
+    fn new(frame: &'a Frame, how: &'a Stochastic, output: Option<&'a Output>, context: &'a Context) -> Self {
+        let transparent = matches!(context.scene.background, None | Some(Background::Transparent));
         let judge =
             Certainty::new(output, (frame.background, frame.has_veil), transparent, how.error, frame.standard_errors);
-        Self { frame, how, judge, rounds: rounds(how, frame.settings).collect() }
+        let fireflies = context.fireflies.as_deref();
+        Self { frame, how, judge, fireflies, rounds: rounds(how, frame.settings).collect() }
     }
 
     /// Whether all pixels get a single sample at first.
@@ -226,7 +230,8 @@ impl<'a> Sampler<'a> {
         known: Tile,
         (pixels, done): (&mut Vec<Pixel>, &mut TilePixels),
     ) {
-        let even = around.even(&self.judge, known);
+        let mut even = around.even(&self.judge, known);
+        first.iter().for_each(|first| first.each_that_may_miss(self.fireflies, known, |at| even.doubt(around.at(at))));
         // Block by block, as rays of pixels near each other run alike.
         for block in known.blocks() {
             for y in block.y0..block.y1 {
@@ -260,7 +265,7 @@ impl<'a> Sampler<'a> {
     /// A pixel with its first sample.
     fn opened(&self, first: &[&First], at: (u32, u32)) -> Pixel {
         let mut pixel = self.pixel(at);
-        first.iter().for_each(|first| first.give(&mut pixel));
+        first.iter().for_each(|first| first.give(&mut pixel, self.fireflies));
         pixel
     }
 
@@ -324,6 +329,8 @@ impl<'a> Sampler<'a> {
                 for (k, &pixel) in some.iter().enumerate() {
                     let of_pixel = k * each..(k + 1) * each;
                     let firsts = tracer.firsts.get(of_pixel.clone()).unwrap_or_default();
+                    let by_chance = tracer.by_chance.get(of_pixel.clone()).unwrap_or_default();
+                    pixels[pixel].expect(self.fireflies, by_chance);
                     pixels[pixel].take(&tracer.samples[of_pixel], firsts, in_group);
                 }
             }

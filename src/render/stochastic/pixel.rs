@@ -2,6 +2,7 @@
 
 use super::places::Wanted;
 use crate::render::certainty::{Certainty, GROUPS, Range};
+use crate::render::fireflies::Fireflies;
 use crate::render::frame::{Sum, pixel_key};
 use crate::render::layers::{FirstSurface, LayerSum};
 use crate::render::tile::{End, PixelFacts};
@@ -24,6 +25,8 @@ pub(super) struct Pixel {
     contrast: f32,
     /// The brightest light among these.
     brightest: f32,
+    /// How bright the fireflies are that it may meet; 0: none.
+    pub firefly: f32,
 }
 
 impl Pixel {
@@ -37,6 +40,7 @@ impl Pixel {
             variance: None,
             contrast: 0.0,
             brightest: 0.0,
+            firefly: 0.0,
         }
     }
 
@@ -54,6 +58,13 @@ impl Pixel {
         }
     }
 
+    /// Expects fireflies that were met near it, if rays of some of these samples were spread by chance.
+    pub(super) fn expect(&mut self, fireflies: Option<&Fireflies>, by_chance: &[bool]) {
+        if let Some(fireflies) = fireflies.filter(|_| by_chance.contains(&true)) {
+            self.firefly = fireflies.at(self.at);
+        }
+    }
+
     /// It is certain enough, with this standard error.
     pub(super) fn done(&mut self, error: f32) {
         (self.facts.error, self.facts.end) = (error, End::Met);
@@ -64,9 +75,10 @@ impl Pixel {
         self.facts.end == End::Met && self.facts.count == samples
     }
 
-    /// Remembers what its first samples and those of the pixels beside it lie between.
+    /// Remembers what its first samples and those of the pixels beside it lie between, and what it may meet by chance.
     pub(super) fn surround(&mut self, judge: &Certainty, range: &Range) {
-        (self.contrast, self.brightest) = (judge.contrast(range), range.brightest);
+        let range = if self.firefly > 0.0 { range.with(judge.range_of(self.firefly)) } else { *range };
+        (self.contrast, self.brightest) = (judge.contrast(&range), range.brightest);
     }
 
     /// The `index`th of its samples.

@@ -24,7 +24,7 @@ pub(super) struct Wanted {
 
 /// Samples that are traced together, one number of each in every column.
 #[derive(Default)]
-pub(super) struct Places {
+pub(in crate::render) struct Places {
     keys: Vec<u32>,
     indices: Vec<u32>,
     /// From the upper left corner of the picture: of the pixel, then of the sample.
@@ -54,7 +54,7 @@ impl Places {
     }
 
     /// The same for the first sample of each of the pixels in these columns and rows.
-    pub(super) fn trace_first<A: Accel, P: Observer>(
+    pub(in crate::render) fn trace_first<A: Accel, P: Observer>(
         &mut self,
         frame: &Frame,
         how: &Stochastic,
@@ -91,6 +91,7 @@ impl Places {
         let streams = keys.iter().zip(&*indices).map(|(&key, &index)| Stream { key, index });
         if frame.settings.lens.is_some() {
             let pixels = x.iter().zip(&*y);
+            tracer.by_chance.fill(true);
             tracer.eyes.send(&eye, streams.clone().zip(pixels).map(|(stream, (&x, &y))| through(how, stream, [x, y])));
         } else {
             Level::best().run(Draw { filter: how.filter, keys, indices, x, y });

@@ -30,7 +30,7 @@ pub(in crate::render) fn render_all<A: Accel, P: Observer>(
     keep: &(impl Fn(TilePixels) + Sync),
 ) -> (Vec<ByClass<P>>, bool) {
     let output = output(how.space, frame.background);
-    let sampler = Sampler::new(frame, how, output.as_ref(), context.scene.background);
+    let sampler = Sampler::new(frame, how, output.as_ref(), context);
     let numbers: Vec<usize> = (0..tiles.len()).collect();
     let (_, counts, complete) = if sampler.starts_with_one() {
         let shared = Shared::new(tiles, |tile| sampler.grown(tile, sampler.reach()));
@@ -267,7 +267,7 @@ mod tests {
         let view = View::look_at(DVec3::new(0.3, 0.2, 4.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.3));
         let frame = Frame::new(&context, &accel, &view, &settings);
         let output = output(how.space, frame.background);
-        let sampler = Sampler::new(&frame, &how, output.as_ref(), scene.background);
+        let sampler = Sampler::new(&frame, &how, output.as_ref(), &context);
         let tiles = tiles(width, height);
         let in_order = |order: &mut dyn Iterator<Item = usize>| {
             let shared = Shared::new(&tiles, |tile| sampler.grown(tile, sampler.reach()));

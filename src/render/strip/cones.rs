@@ -123,7 +123,8 @@ impl Strip {
             debug_assert_ne!(exclude, NO_PRIM);
             let (cone_width, cone_spread, weight) = (cones.width[i], spread[i], get(weight, i));
             let depth = path.depth + 1;
-            let path = Path { weight, depth, straight: false, since: 0.0, cone_width, cone_spread, ..path };
+            let path =
+                Path { weight, depth, straight: false, calm: false, since: 0.0, cone_width, cone_spread, ..path };
             let mut path = path.turned(RayClass::Reflected, 0);
             if goes_on(sample, &mut path) {
                 to.push(ray, path, Hit::MISS);

@@ -1,0 +1,119 @@
+//! Rays from rough surfaces to the glare of a panorama.
+//!
+//! Of the rays that a rough surface spreads few would meet a sun, each far too bright. So for each of them another is sent to where
+//! the glare is, with the light that facets turn from there to the viewer, and what is spread sees the rest of the sky
+//! (P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo Techniques for Direct Lighting Calculations", 1996). Facets that let
+//! light through bend it as in B. Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet Models for Refraction through Rough
+//! Surfaces" (2007).
+
+use super::branch::{Ground, Point, Rough};
+use super::context::Context;
+use super::draws::Purpose;
+use super::observer::Observer;
+use super::shade::{Lobe, Seen};
+use super::wave::{Crossing, Media};
+use super::whitted::Tracer;
+use crate::accel::Accel;
+use crate::math::Vec3;
+
+/// Of which rays that a surface spreads the glare was asked for itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Calm {
+    pub mirrored: bool,
+    pub through: bool,
+}
+
+impl Calm {
+    /// Of those that go on in empty space, unless it is not the sky that they see there. Between the walls of glass they are turned
+    /// again before they leave it.
+    fn of<G: Ground>(context: &Context, point: &Point<G>, crossing: &Crossing, lobe: &Lobe) -> Self {
+        let is_outside = |media: &Media| media.innermost().is_none();
+        let sees_background = point.path.straight && crossing.n_i == crossing.n_t && !context.shows_environment;
+        match context.sky.glare() {
+            // What shows the whole sun or nothing of it needs no help.
+            Some(area) if lobe.solid_angle() > area => Self {
+                mirrored: is_outside(&point.path.media),
+                through: is_outside(&crossing.beyond) && !sees_background,
+            },
+            _ => Self::default(),
+        }
+    }
+}
+
+impl<A: Accel, P: Observer> Tracer<'_, A, P> {
+    /// Sends a ray to the glare for each that a surface spreads; of which of these that was done.
+    pub(super) fn ask_for_glare<G: Ground>(&mut self, point: &Point<G>, crossing: &Crossing, rough: &Rough) -> Calm {
+        let context = self.context;
+        let calm = Calm::of(context, point, crossing, &rough.lobe);
+        // Where colours are bent apart each has facets of its own.
+        if calm == Calm::default() || self.splits(point) {
+            return Calm::default();
+        }
+        let spread = self.draws(point, Purpose::Glare).spread(rough.rays);
+        let (seen, part) = (point.surface.seen(), 1.0 / rough.rays as f32);
+        for k in 0..rough.rays {
+            let Some((dir, radiance)) = context.sky.to_glare(spread.point(k)) else { continue };
+            let mirrors = seen.normal.dot(dir) > 0.0;
+            // Normals and the face itself may not agree on the side.
+            if mirrors != (seen.geometric.dot(dir) > 0.0) || !(if mirrors { calm.mirrored } else { calm.through }) {
+                continue;
+            }
+            let shown = if mirrors {
+                mirrored(point, crossing, &rough.lobe, dir)
+            } else {
+                let_through(point, crossing, &rough.lobe, dir)
+            };
+            let light = point.path.weight * shown * radiance * part;
+            if light.is_finite() && context.is_worth_a_ray(light, point.path.part * part) {
+                let media = if mirrors { point.path.media } else { crossing.beyond };
+                let media = context.absorption.is_some().then_some(media);
+                self.glares.push(point.surface.ray(dir, point.ray.sample), light, media);
+            }
+        }
+        calm
+    }
+}
+
+/// What facets of a lobe mirror of light from a direction: a share, 1/sr.
+fn mirrored<G: Ground>(point: &Point<G>, crossing: &Crossing, lobe: &Lobe, dir: Vec3) -> Vec3 {
+    let Seen { view, .. } = point.surface.seen();
+    let Some((facet, density)) = lobe.facet_to(view, dir) else { return Vec3::ZERO };
+    let balance = point.matter.balance(view.dot(facet), crossing);
+    ((balance.reflected - balance.glass) * lobe.sent(view, dir) + balance.glass) * density
+}
+
+/// What they let through.
+fn let_through<G: Ground>(point: &Point<G>, crossing: &Crossing, lobe: &Lobe, dir: Vec3) -> Vec3 {
+    let Seen { normal, view, .. } = point.surface.seen();
+    let facet = if crossing.n_i == crossing.n_t {
+        // Thin: as a mirror does, on the other side.
+        lobe.facet_to(view, dir - normal * (2.0 * normal.dot(dir)))
+    } else {
+        lobe.facet_through(view, dir, (crossing.n_i, crossing.n_t))
+    };
+    let Some((facet, density)) = facet else { return Vec3::ZERO };
+    point.matter.balance(view.dot(facet), crossing).refracted * density
+}
+
+impl Lobe {
+    /// The facet that mirrors a direction to the view, and how densely directions lie there, 1/sr.
+    fn facet_to(&self, view: Vec3, dir: Vec3) -> Option<(Vec3, f32)> {
+        let facet = (view + dir).try_normalize()?;
+        (view.dot(facet) > 0.0 && self.is_on_front(facet)).then(|| (facet, self.density(view, facet)))
+    }
+
+    /// The facet that bends the view to a direction on the other side, between media of these indices, and how densely directions
+    /// lie there, 1/sr.
+    fn facet_through(&self, view: Vec3, dir: Vec3, (n_i, n_t): (f32, f32)) -> Option<(Vec3, f32)> {
+        let facet = (view * n_i + dir * n_t).try_normalize()?;
+        let facet = if self.is_on_front(facet) { facet } else { -facet };
+        let (near, far) = (view.dot(facet), dir.dot(facet));
+        if near <= 0.0 || far >= 0.0 {
+            return None;
+        }
+        // Of facets, not of what they mirror.
+        let facets = self.density(view, facet) * 4.0 * near;
+        let across = n_i * near + n_t * far;
+        Some((facet, facets * n_t * n_t * -far / (across * across)))
+    }
+}
