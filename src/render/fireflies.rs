@@ -7,13 +7,14 @@
 
 use super::by_class::ByClass;
 use super::context::Context;
-use super::frame::Frame;
+use super::frame::{Frame, pixel_key};
 use super::observer::Observer;
 use super::part::Quiet;
+use super::roulette::Roulette;
 use super::sampling::{ErrorSpace, Sampling, Stochastic};
-use super::stochastic::Places;
-use super::tile::{TILE, Tile, each_tile, tiles};
-use super::whitted::Tracer;
+use super::stochastic::{Places, Wanted};
+use super::tile::{TILE, TOGETHER, Tile, each_tile, tiles};
+use super::whitted::{Sample, Tracer};
 use super::{Job, Progress};
 use crate::accel::Accel;
 use std::sync::Arc;
@@ -21,6 +22,14 @@ use std::sync::Arc;
 /// Of a picture with more pixels than [`SMALL`] one in so many columns of one in so many rows is asked.
 const STEP: u32 = 2;
 const SMALL: u64 = 1 << 16;
+
+/// Of a pixel that shows something bright so many more samples are taken, …
+const AGAIN: u32 = 16;
+/// … and it is a firefly if hardly any shows it again: a pixel that shows it often will find out by itself.
+const SELDOM: usize = 2;
+
+/// What is this part as bright is nearly as bright.
+const NEARLY: f32 = 0.25;
 
 /// Fireflies are looked for so many tiles away: what one of thousands of samples meets is then hardly overlooked.
 const REACH: usize = 2;
@@ -56,41 +65,77 @@ pub(super) fn look<P: Observer>(job: &Job, context: &mut Context, progress: &dyn
         return (0, Vec::new());
     }
     let (width, height) = (settings.width, settings.height);
-    let frame = Frame::new(context, accel, view, settings);
-    let gain = match how.space {
-        ErrorSpace::Linear => 1.0,
-        ErrorSpace::Display { exposure, .. } => libm::exp2f(exposure),
-    };
     let step = if u64::from(width) * u64::from(height) > SMALL { STEP } else { 1 };
-    let work = |tracer: &mut Tracer<_, P>, &tile: &Tile| ask(&frame, how, tracer, (tile, step), gain);
-    let (answers, counts, complete) = each_tile(context, accel, &tiles(width, height), &Quiet(progress), work);
-    let rays = answers.iter().map(Vec::len).sum::<usize>() as u64;
+    let question = Question { frame: &Frame::new(context, accel, view, settings), how, step };
+    let work = |tracer: &mut Tracer<_, P>, &tile: &Tile| question.ask(tracer, tile);
+    let (answers, mut counts, complete) = each_tile(context, accel, &tiles(width, height), &Quiet(progress), work);
+    let mut rays = answers.iter().map(Vec::len).sum::<usize>() as u64;
     // Who has cancelled wants no more of the picture, either.
+    if !complete {
+        return (rays, counts);
+    }
+    let (columns, rows) = (width.div_ceil(step) as usize, height.div_ceil(step) as usize);
+    let bright = Grid::of(columns, rows, answers.into_iter().flatten(), step).bright(step);
+    let some: Vec<&[Bright]> = bright.chunks(TOGETHER / AGAIN as usize).collect();
+    let work = |tracer: &mut Tracer<_, P>, some: &&[Bright]| question.ask_again(tracer, some);
+    let (answers, more, complete) = each_tile(context, accel, &some, &Quiet(progress), work);
+    rays += bright.len() as u64 * u64::from(AGAIN);
+    counts.extend(more);
     if complete {
-        let (columns, rows) = (width.div_ceil(step) as usize, height.div_ceil(step) as usize);
-        let asked = Grid::of(columns, rows, answers.into_iter().flatten());
-        context.fireflies = Some(Arc::new(Fireflies::among(&asked, (TILE / step) as usize)));
+        let tiles = (width.div_ceil(TILE) as usize, height.div_ceil(TILE) as usize);
+        context.fireflies = Some(Arc::new(Fireflies::among(answers.into_iter().flatten().collect(), tiles)));
     }
     (rays, counts)
 }
 
-/// Asks one pixel of each square of `step` columns and rows of a tile; the column and row of each in all that are asked. `None`
-/// when cancelled.
-fn ask<A: Accel, P: Observer>(
-    frame: &Frame,
-    how: &Stochastic,
-    tracer: &mut Tracer<A, P>,
-    (tile, step): (Tile, u32),
-    gain: f32,
-) -> Option<Vec<((u32, u32), Asked)>> {
-    let (columns, rows): (Vec<u32>, Vec<u32>) = tile.places().filter(|(x, y)| x % step == 0 && y % step == 0).unzip();
-    Places::default().trace_first(frame, how, tracer, (&columns, &rows))?;
-    let places = columns.iter().zip(&rows).map(|(x, y)| (x / step, y / step));
-    let asked = tracer.samples.iter().zip(&tracer.by_chance).map(|(sample, &by_chance)| {
+/// A pixel whose sample may be a firefly, and how bright that is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Bright {
+    pixel: (u32, u32),
+    light: f32,
+}
+
+/// How pixels are asked.
+struct Question<'a> {
+    frame: &'a Frame<'a>,
+    how: &'a Stochastic,
+    step: u32,
+}
+
+impl Question<'_> {
+    /// How bright a sample is, after exposure.
+    fn light(&self, sample: &Sample) -> f32 {
+        let gain = match self.how.space {
+            ErrorSpace::Linear => 1.0,
+            ErrorSpace::Display { exposure, .. } => libm::exp2f(exposure),
+        };
         let light = sample.radiance.max_element() * gain;
-        Asked { light: if light.is_finite() { light } else { 0.0 }, by_chance }
-    });
-    Some(places.zip(asked).collect())
+        if light.is_finite() { light } else { 0.0 }
+    }
+
+    /// Asks one pixel of each square of `step` columns and rows of a tile. `None` when cancelled.
+    fn ask<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, tile: Tile) -> Option<Vec<((u32, u32), Asked)>> {
+        let is_asked = |(x, y): &(u32, u32)| x % self.step == 0 && y % self.step == 0;
+        let (columns, rows): (Vec<u32>, Vec<u32>) = tile.places().filter(is_asked).unzip();
+        Places::default().trace_first(self.frame, self.how, tracer, (&columns, &rows))?;
+        let samples = tracer.samples.iter().zip(&tracer.by_chance);
+        let asked = samples.map(|(sample, &by_chance)| Asked { light: self.light(sample), by_chance });
+        Some(columns.into_iter().zip(rows).zip(asked).collect())
+    }
+
+    /// Asks some pixels for more samples, and tells which of them show what they did by chance. `None` when cancelled.
+    fn ask_again<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, some: &[Bright]) -> Option<Vec<Bright>> {
+        let seed = self.frame.settings.seed;
+        let wanted = some.iter().flat_map(|&Bright { pixel, .. }| {
+            (1..=AGAIN).map(move |index| Wanted { pixel, key: pixel_key(seed, pixel), index })
+        });
+        Places::default().trace(self.frame, self.how, tracer, (Roulette::default(), wanted))?;
+        let each = some.iter().zip(tracer.samples.chunks(AGAIN as usize));
+        let is_rare = |(bright, samples): &(&Bright, &[Sample])| {
+            samples.iter().filter(|sample| self.light(sample) >= NEARLY * bright.light).count() <= SELDOM
+        };
+        Some(each.filter(is_rare).map(|(bright, _)| *bright).collect())
+    }
 }
 
 /// All samples, row by row.
@@ -101,18 +146,27 @@ struct Grid {
 }
 
 impl Grid {
-    fn of(columns: usize, rows: usize, asked: impl Iterator<Item = ((u32, u32), Asked)>) -> Self {
+    fn of(columns: usize, rows: usize, asked: impl Iterator<Item = ((u32, u32), Asked)>, step: u32) -> Self {
         let mut each = vec![Asked::NOTHING; columns * rows];
-        asked.for_each(|((x, y), asked)| each[y as usize * columns + x as usize] = asked);
+        asked.for_each(|((x, y), asked)| each[(y / step) as usize * columns + (x / step) as usize] = asked);
         Self { columns, rows, each }
     }
 
-    /// Whether a sample is far brighter than white, and than all but a few of those beside it.
-    fn is_firefly(&self, x: usize, y: usize) -> bool {
+    /// The pixels whose samples may be fireflies.
+    fn bright(&self, step: u32) -> Vec<Bright> {
+        let places = (0..self.rows).flat_map(|y| (0..self.columns).map(move |x| (x, y)));
+        let bright = places.filter(|&(x, y)| self.is_bright(x, y)).map(|(x, y)| {
+            #[expect(clippy::cast_possible_truncation, reason = "columns and rows of a picture")]
+            let pixel = (x as u32 * step, y as u32 * step);
+            Bright { pixel, light: self.each[y * self.columns + x].light }
+        });
+        bright.collect()
+    }
+
+    /// Whether a sample is brighter than white, and far brighter than all but a few of those beside it.
+    fn is_bright(&self, x: usize, y: usize) -> bool {
         /// Less than so many beside it are no wide thing that is seen in each of some pixels.
         const FEW: usize = 3;
-        /// What is this part as bright is nearly as bright.
-        const NEARLY: f32 = 0.25;
         let Asked { light, by_chance } = self.each[y * self.columns + x];
         let rows = y.saturating_sub(1)..(y + 2).min(self.rows);
         let near = rows.flat_map(|y| {
@@ -125,17 +179,15 @@ impl Grid {
 }
 
 impl Fireflies {
-    /// Those among samples of a picture of which a tile has so many columns and rows.
-    #[expect(clippy::cast_precision_loss, reason = "a mean")]
-    fn among(asked: &Grid, side: usize) -> Self {
-        let (columns, rows) = (asked.columns.div_ceil(side), asked.rows.div_ceil(side));
+    /// These, in a picture of so many columns and rows of tiles.
+    fn among(mut each: Vec<Bright>, (columns, rows): (usize, usize)) -> Self {
+        // Threads answer in any order; sums have one.
+        each.sort_unstable_by_key(|bright| bright.pixel);
         let mut of_tiles = vec![(0.0, 0_u32); columns * rows];
-        for (y, x) in (0..asked.rows).flat_map(|y| (0..asked.columns).map(move |x| (y, x))) {
-            if asked.is_firefly(x, y) {
-                let (sum, count) = &mut of_tiles[y / side * columns + x / side];
-                *sum += f64::from(asked.each[y * asked.columns + x].light);
-                *count += 1;
-            }
+        for Bright { pixel: (x, y), light } in each {
+            let (sum, count) = &mut of_tiles[(y / TILE) as usize * columns + (x / TILE) as usize];
+            *sum += f64::from(light);
+            *count += 1;
         }
         let around = |at: usize, end: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(end);
         let brightness = (0..columns * rows).map(|i| {
@@ -167,23 +219,25 @@ mod tests {
     }
 
     #[test]
-    fn a_firefly_is_brighter_than_white_and_than_all_but_a_few_beside_it() {
-        let is = |bright: &[(usize, usize, f32)]| grid(5, 5, bright).is_firefly(2, 2);
+    fn a_firefly_may_be_what_is_brighter_than_white_and_than_all_but_a_few_beside_it() {
+        let is = |bright: &[(usize, usize, f32)]| grid(5, 5, bright).is_bright(2, 2);
         assert!(is(&[(2, 2, 50.0)]) && is(&[(2, 2, 50.0), (1, 1, 60.0), (3, 2, 20.0)]));
         assert!(!is(&[(2, 2, 0.9)]), "no more than white");
         assert!(!is(&[(2, 2, 50.0), (1, 1, 60.0), (3, 2, 20.0), (3, 3, 13.0)]), "a wide lamp");
         let mut straight = grid(5, 5, &[(2, 2, 50.0)]);
         straight.each[12].by_chance = false;
-        assert!(!straight.is_firefly(2, 2), "a pixel sees it whenever it looks");
+        assert!(!straight.is_bright(2, 2), "a pixel sees it whenever it looks");
         let corner = grid(5, 5, &[(0, 0, 50.0), (4, 4, 50.0)]);
-        assert!(corner.is_firefly(0, 0) && corner.is_firefly(4, 4));
+        assert!(corner.is_bright(0, 0) && corner.is_bright(4, 4));
+        let pixels: Vec<_> = corner.bright(2).iter().map(|bright| bright.pixel).collect();
+        assert_eq!(pixels, [(0, 0), (8, 8)]);
     }
 
     #[test]
     fn pixels_hear_of_fireflies_in_their_tile_and_two_tiles_around_it() {
-        // Seven tiles by two, of which the last ones are small; samples of one column and row of two.
-        let found = Fireflies::among(&grid(97, 20, &[(8, 3, 30.0), (12, 9, 50.0), (90, 3, 4.0)]), 16);
-        assert_eq!(found.columns, 7);
+        let bright = |x, y, light| Bright { pixel: (x, y), light };
+        let each = vec![bright(180, 6, 4.0), bright(16, 6, 30.0), bright(24, 18, 50.0)];
+        let found = Fireflies::among(each, (7, 2));
         let heard = [0, 31, 32, 95, 96, 127, 128, 193].map(|x| found.at((x, 0)));
         assert_eq!(heard, [40.0, 40.0, 40.0, 40.0, 4.0, 4.0, 4.0, 4.0]);
         assert_eq!(found.at((0, 39)), 40.0, "the row of tiles below");

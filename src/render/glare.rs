@@ -117,3 +117,57 @@ impl Lobe {
         Some((facet, facets * n_t * n_t * -far / (across * across)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::optics::{reflect, refract};
+    use std::f32::consts::PI;
+
+    /// What part of drawn facets sends the view to within 8° of a direction, and what part should by their density.
+    fn within(
+        lobe: &Lobe,
+        view: Vec3,
+        dir: Vec3,
+        send: impl Fn(Vec3) -> Option<Vec3>,
+        density: impl Fn(Vec3) -> f32,
+    ) -> [f32; 2] {
+        let (count, least) = (40_000_u16, libm::cosf(8.0_f32.to_radians()));
+        let at = |k: u16| [(f32::from(k) + 0.5) / f32::from(count), (f32::from(k) * 0.618_034).fract()];
+        let drawn = (0..count).filter_map(|k| send(lobe.facet(view, at(k)))).filter(|to| to.dot(dir) > least).count();
+        let (tangent, bitangent) = dir.any_orthonormal_pair();
+        let area = 2.0 * PI * (1.0 - least);
+        let of_density = (0..count).map(at).map(|[u, v]| {
+            let (cosine, (sin, cos)) = (1.0 - u * (1.0 - least), libm::sincosf(2.0 * PI * v));
+            density(dir * cosine + (tangent * cos + bitangent * sin) * (1.0 - cosine * cosine).sqrt())
+        });
+        [drawn as f32 / f32::from(count), of_density.sum::<f32>() / f32::from(count) * area]
+    }
+
+    #[test]
+    fn facets_send_rays_as_densely_as_they_are_said_to() {
+        let axes = [Vec3::new(0.6, 0.8, 0.0), Vec3::new(-0.8, 0.6, 0.0)];
+        for (alpha, tilt) in [([0.1, 0.1], 0.0_f32), ([0.3, 0.3], 0.7), ([0.4, 0.1], 0.5), ([0.8, 0.8], 1.2)] {
+            let lobe = Lobe::new(axes, Vec3::Z, alpha);
+            let view = Vec3::new(libm::sinf(tilt), 0.0, libm::cosf(tilt));
+            for off in [0.0, 0.3] {
+                let facet = Vec3::new(off * 0.5, off, 1.0).normalize();
+                let to = reflect(-view, facet);
+                let mirrors = |facet: Vec3| Some(reflect(-view, facet));
+                let [drawn, said] =
+                    within(&lobe, view, to, mirrors, |to| lobe.facet_to(view, to).map_or(0.0, |(_, d)| d));
+                assert!((drawn - said).abs() < 0.02 * said + 0.001, "{alpha:?} {tilt} {off}: {drawn} {said}");
+                for (n_i, n_t) in [(1.0, 1.5), (1.5, 1.0), (1.33, 1.6)] {
+                    let bend = |facet: Vec3| refract(-view, facet, f64::from(n_i), f64::from(n_t));
+                    let Some(to) = bend(facet) else { continue };
+                    let density = |to: Vec3| lobe.facet_through(view, to, (n_i, n_t)).map_or(0.0, |(_, d)| d);
+                    let [drawn, said] = within(&lobe, view, to, bend, density);
+                    assert!(
+                        (drawn - said).abs() < 0.02 * said + 0.001,
+                        "{alpha:?} {tilt} {off} {n_i} {n_t}: {drawn} {said}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -267,6 +267,7 @@ fn render_with<P: Observer>(
             tile::render_tiles(&context, job.accel, job.view, settings, progress);
         (Rendered { picture, counts: ClassCounts::default(), sampled, depth: context.depth, complete }, counts)
     });
+    rendered.sampled.looked = rays;
     rendered.sampled.rays += rays;
     counts.extend(more);
     (rendered, counts)

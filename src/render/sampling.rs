@@ -190,6 +190,8 @@ pub struct Sampled {
     pub errors: Vec<f32>,
     /// Eye rays in all.
     pub rays: u64,
+    /// Of them those that were sent before the picture, to find what rays that are spread by chance seldom meet.
+    pub looked: u64,
     /// Pixels whose mean became as certain as was asked.
     pub met: u64,
     /// Pixels that were given up at the most rays allowed.

@@ -20,7 +20,7 @@ pub(crate) struct Lobe {
 
 impl Lobe {
     /// The axes and the normal are unit vectors, perpendicular to each other.
-    pub(super) fn new([along, across]: [Vec3; 2], normal: Vec3, alpha: [f32; 2]) -> Self {
+    pub(crate) fn new([along, across]: [Vec3; 2], normal: Vec3, alpha: [f32; 2]) -> Self {
         Self { along, across, normal, alpha }
     }
 

@@ -30,7 +30,7 @@ use crate::scene::Background;
 use around::Around;
 use first::First;
 use pixel::Pixel;
-pub(in crate::render) use places::Places;
+pub(in crate::render) use places::{Places, Wanted};
 pub(super) use shared::render_all;
 use std::ops::Range;
 

@@ -13,7 +13,7 @@ use crate::render::whitted::Tracer;
 
 /// A sample of a pixel.
 #[derive(Clone, Copy)]
-pub(super) struct Wanted {
+pub(in crate::render) struct Wanted {
     /// Column and row.
     pub pixel: (u32, u32),
     /// For all numbers of the pixel.
@@ -34,7 +34,7 @@ pub(in crate::render) struct Places {
 
 impl Places {
     /// Traces these samples all together; `None` when cancelled.
-    pub(super) fn trace<A: Accel, P: Observer>(
+    pub(in crate::render) fn trace<A: Accel, P: Observer>(
         &mut self,
         frame: &Frame,
         how: &Stochastic,

@@ -4,6 +4,7 @@ mod around;
 mod bits;
 mod costs;
 mod gaps;
+mod glare;
 mod glass;
 mod glints;
 mod gloss;
