@@ -6,6 +6,7 @@
 //! not certain before they have met one, too, or so many of their samples have not that it matters little.
 
 use super::by_class::ByClass;
+use super::certainty::{Certainty, output};
 use super::context::Context;
 use super::frame::{Frame, pixel_key};
 use super::observer::Observer;
@@ -33,13 +34,43 @@ const NEARLY: f32 = 0.25;
 
 /// Fireflies are looked for so many tiles away: what one of thousands of samples meets is then hardly overlooked.
 const REACH: usize = 2;
+/// Fewest fireflies that tell how many there are in a tile, in nine, and in all of these.
+const FEWEST: [u32; REACH + 1] = [4, 2, 1];
+
+/// What samples of some tiles have shown that may have met something by chance.
+#[derive(Clone, Copy, Debug, Default)]
+struct Told {
+    samples: u32,
+    /// The sum of their light, no more than white each.
+    light: f64,
+    /// Fireflies among them, and the sum of their light.
+    fireflies: u32,
+    bright: f64,
+}
+
+impl Told {
+    fn with(self, other: &Self) -> Self {
+        Self {
+            samples: self.samples + other.samples,
+            light: self.light + other.light,
+            fireflies: self.fireflies + other.fireflies,
+            bright: self.bright + other.bright,
+        }
+    }
+
+    /// That part of a sum that each sample has.
+    #[expect(clippy::cast_possible_truncation, reason = "as exact as light is")]
+    fn mean(&self, sum: f64) -> f32 {
+        (sum / f64::from(self.samples.max(1))) as f32
+    }
+}
 
 /// Where fireflies were met.
 #[derive(Debug)]
 pub(super) struct Fireflies {
     /// Tiles in a row.
     columns: usize,
-    /// How bright those in and around each tile are on average, after exposure; 0 where there are none.
+    /// How bright those in and around each tile are on average, after exposure; 0 where there are none that matter.
     brightness: Vec<f32>,
 }
 
@@ -75,15 +106,19 @@ pub(super) fn look<P: Observer>(job: &Job, context: &mut Context, progress: &dyn
         return (rays, counts);
     }
     let (columns, rows) = (width.div_ceil(step) as usize, height.div_ceil(step) as usize);
-    let bright = Grid::of(columns, rows, answers.into_iter().flatten(), step).bright(step);
+    let asked = Grid::of(columns, rows, answers.into_iter().flatten(), step);
+    let bright = asked.bright(step);
     let some: Vec<&[Bright]> = bright.chunks(TOGETHER / AGAIN as usize).collect();
     let work = |tracer: &mut Tracer<_, P>, some: &&[Bright]| question.ask_again(tracer, some);
     let (answers, more, complete) = each_tile(context, accel, &some, &Quiet(progress), work);
     rays += bright.len() as u64 * u64::from(AGAIN);
     counts.extend(more);
     if complete {
-        let tiles = (width.div_ceil(TILE) as usize, height.div_ceil(TILE) as usize);
-        context.fireflies = Some(Arc::new(Fireflies::among(answers.into_iter().flatten().collect(), tiles)));
+        let rare = answers.into_iter().flatten().collect();
+        let found = Fireflies::among(rare, &asked.in_tiles((TILE / step) as usize), |light, more| {
+            question.matters(light, more)
+        });
+        context.fireflies = Some(Arc::new(found));
     }
     (rays, counts)
 }
@@ -103,6 +138,24 @@ struct Question<'a> {
 }
 
 impl Question<'_> {
+    /// Whether pixels as bright as this are written too dark where so much light is missed, after exposure.
+    fn matters(&self, light: f32, more: f32) -> bool {
+        /// What part of what a pixel may be wrong by all around it may be.
+        const OF_PIXEL: f32 = 0.25;
+        /// And of the error of the whole picture, if that is what was asked for.
+        const OF_ALL: f32 = 0.5;
+        let Self { frame, how, .. } = *self;
+        let output = output(how.space, frame.background);
+        let judge = Certainty::new(
+            output.as_ref(),
+            (frame.background, frame.has_veil),
+            false,
+            how.error,
+            frame.standard_errors,
+        );
+        judge.grey(light + more) - judge.grey(light) > how.target.map_or(OF_PIXEL * how.error, |all| OF_ALL * all)
+    }
+
     /// How bright a sample is, after exposure.
     fn light(&self, sample: &Sample) -> f32 {
         let gain = match self.how.space {
@@ -152,6 +205,22 @@ impl Grid {
         Self { columns, rows, each }
     }
 
+    /// What was asked of each tile of so many columns and rows of samples, of what may have met something by chance; and tiles in
+    /// a row.
+    fn in_tiles(&self, side: usize) -> (Vec<Told>, usize) {
+        let columns = self.columns.div_ceil(side);
+        let mut tiles = vec![Told::default(); columns * self.rows.div_ceil(side)];
+        for (y, x) in (0..self.rows).flat_map(|y| (0..self.columns).map(move |x| (y, x))) {
+            let Asked { light, by_chance } = self.each[y * self.columns + x];
+            if by_chance {
+                let tile = &mut tiles[y / side * columns + x / side];
+                tile.samples += 1;
+                tile.light += f64::from(light.clamp(0.0, 1.0));
+            }
+        }
+        (tiles, columns)
+    }
+
     /// The pixels whose samples may be fireflies.
     fn bright(&self, step: u32) -> Vec<Bright> {
         let places = (0..self.rows).flat_map(|y| (0..self.columns).map(move |x| (x, y)));
@@ -179,24 +248,32 @@ impl Grid {
 }
 
 impl Fireflies {
-    /// These, in a picture of so many columns and rows of tiles.
-    fn among(mut each: Vec<Bright>, (columns, rows): (usize, usize)) -> Self {
+    /// These, in a picture of which the tiles were told so much, where they matter: told how bright pixels are, and how much more
+    /// light the fireflies bring on average.
+    fn among(mut each: Vec<Bright>, (tiles, columns): &(Vec<Told>, usize), matters: impl Fn(f32, f32) -> bool) -> Self {
         // Threads answer in any order; sums have one.
         each.sort_unstable_by_key(|bright| bright.pixel);
-        let mut of_tiles = vec![(0.0, 0_u32); columns * rows];
+        let (mut tiles, columns, rows) = (tiles.clone(), *columns, tiles.len() / (*columns).max(1));
         for Bright { pixel: (x, y), light } in each {
-            let (sum, count) = &mut of_tiles[(y / TILE) as usize * columns + (x / TILE) as usize];
-            *sum += f64::from(light);
-            *count += 1;
+            let tile = &mut tiles[(y / TILE) as usize * columns + (x / TILE) as usize];
+            tile.bright += f64::from(light);
+            tile.fireflies += 1;
         }
-        let around = |at: usize, end: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(end);
-        let brightness = (0..columns * rows).map(|i| {
-            let tiles =
-                around(i / columns, rows).flat_map(|row| &of_tiles[row * columns..][around(i % columns, columns)]);
-            let (sum, count) = tiles.fold((0.0, 0), |(sum, count), tile| (sum + tile.0, count + tile.1));
+        let around = |i: usize, reach: usize| {
+            let near = |at: usize, end: usize| at.saturating_sub(reach)..(at + reach + 1).min(end);
+            let tiles = near(i / columns, rows).flat_map(|row| &tiles[row * columns..][near(i % columns, columns)]);
+            tiles.fold(Told::default(), Told::with)
+        };
+        let brightness = (0..tiles.len()).map(|i| {
+            let do_matter = |reach: usize| {
+                let told = around(i, reach);
+                // One in a tile may be the only one for many tiles around.
+                told.fireflies >= FEWEST[reach] && matters(told.mean(told.light), told.mean(told.bright))
+            };
+            let Told { bright, fireflies, .. } = around(i, REACH);
             #[expect(clippy::cast_possible_truncation, reason = "as exact as light is")]
-            let mean = (sum / f64::from(count.max(1))) as f32;
-            mean
+            let mean = (bright / f64::from(fireflies.max(1))) as f32;
+            if (0..=REACH).any(do_matter) { mean } else { 0.0 }
         });
         Self { columns, brightness: brightness.collect() }
     }
@@ -235,11 +312,27 @@ mod tests {
 
     #[test]
     fn pixels_hear_of_fireflies_in_their_tile_and_two_tiles_around_it() {
-        let bright = |x, y, light| Bright { pixel: (x, y), light };
+        let (bright, told) = (|x, y, light| Bright { pixel: (x, y), light }, Told { samples: 256, ..Told::default() });
         let each = vec![bright(180, 6, 4.0), bright(16, 6, 30.0), bright(24, 18, 50.0)];
-        let found = Fireflies::among(each, (7, 2));
+        let found = Fireflies::among(each, &(vec![told; 14], 7), |_, more| more > 0.0);
         let heard = [0, 31, 32, 95, 96, 127, 128, 193].map(|x| found.at((x, 0)));
         assert_eq!(heard, [40.0, 40.0, 40.0, 40.0, 4.0, 4.0, 4.0, 4.0]);
         assert_eq!(found.at((0, 39)), 40.0, "the row of tiles below");
+    }
+
+    #[test]
+    fn fireflies_count_where_without_them_pixels_would_be_too_dark() {
+        let told = Told { samples: 256, light: 25.6, ..Told::default() };
+        let of = |fireflies: u32, least: f32| {
+            let each = (0..fireflies).map(|i| Bright { pixel: (70 + i, 7), light: 10.0 });
+            let matters = move |light: f32, more: f32| (light - 0.1).abs() < 1e-6 && more > least;
+            let found = Fireflies::among(each.collect(), &(vec![told; 5], 5), matters);
+            [0, 32, 64].map(|x| found.at((x, 0)))
+        };
+        // Of five tiles in a row all are near the middle one, three next to it.
+        let mean = |fireflies: f32, tiles: f32| fireflies * 10.0 / (256.0 * tiles);
+        assert_eq!(of(1, 0.99 * mean(1.0, 5.0)), [10.0; 3], "anywhere");
+        assert_eq!(of(4, 1.01 * mean(4.0, 3.0)), [0.0, 0.0, 10.0], "in their tile alone");
+        assert_eq!(of(2, 1.01 * mean(2.0, 3.0)), [0.0; 3], "two tell nothing of a tile");
     }
 }

@@ -89,15 +89,17 @@ impl<'a> Certainty<'a> {
         above.min(below) < 3
     }
 
+    /// How grey light as bright as this is written, after exposure.
+    pub(super) fn grey(&self, light: f32) -> f32 {
+        let grey = light / self.gain;
+        self.developer.as_ref().map_or(grey, |developer| developer.coded([grey, grey, grey, 1.0])[0])
+    }
+
     /// What grey light as bright as this lies between, after exposure.
     pub(super) fn range_of(&self, light: f32) -> Range {
-        let grey = light / self.gain;
-        let color = match &self.developer {
-            Some(developer) => Vec4::from_array(developer.coded([grey, grey, grey, 1.0])),
-            None => Vec4::new(grey, grey, grey, 1.0),
-        };
+        let grey = self.grey(light);
         // It may show whatever covers the pixel.
-        let without_alpha = |alpha: f32| Vec4::new(color.x, color.y, color.z, alpha);
+        let without_alpha = |alpha: f32| Vec4::new(grey, grey, grey, alpha);
         Range { least: without_alpha(f32::INFINITY), most: without_alpha(f32::NEG_INFINITY), brightest: light }
     }
 
