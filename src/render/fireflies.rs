@@ -114,13 +114,22 @@ pub(super) fn look<P: Observer>(job: &Job, context: &mut Context, progress: &dyn
     rays += bright.len() as u64 * u64::from(AGAIN);
     counts.extend(more);
     if complete {
-        let rare = answers.into_iter().flatten().collect();
-        let found = Fireflies::among(rare, &asked.in_tiles((TILE / step) as usize), |light, more| {
-            question.matters(light, more)
-        });
-        context.fireflies = Some(Arc::new(found));
+        let (rare, told) = (answers.into_iter().flatten().collect(), asked.in_tiles((TILE / step) as usize));
+        let output = output(how.space, question.frame.background);
+        let judge = Certainty::of(question.frame, how, output.as_ref(), context.scene.background);
+        let matters = |light, more| judge.grey(light + more) - judge.grey(light) > missed_at_most(how);
+        context.fireflies = Some(Arc::new(Fireflies::among(rare, &told, matters)));
     }
     (rays, counts)
+}
+
+/// How much too dark all pixels of some tiles may be, as they are written.
+fn missed_at_most(how: &Stochastic) -> f32 {
+    /// Part of what a single pixel may be wrong by.
+    const OF_PIXEL: f32 = 0.25;
+    /// And of the error of the whole picture, if that is what was asked for.
+    const OF_ALL: f32 = 0.5;
+    how.target.map_or(OF_PIXEL * how.error, |all| OF_ALL * all)
 }
 
 /// A pixel whose sample may be a firefly, and how bright that is.
@@ -138,24 +147,6 @@ struct Question<'a> {
 }
 
 impl Question<'_> {
-    /// Whether pixels as bright as this are written too dark where so much light is missed, after exposure.
-    fn matters(&self, light: f32, more: f32) -> bool {
-        /// What part of what a pixel may be wrong by all around it may be.
-        const OF_PIXEL: f32 = 0.25;
-        /// And of the error of the whole picture, if that is what was asked for.
-        const OF_ALL: f32 = 0.5;
-        let Self { frame, how, .. } = *self;
-        let output = output(how.space, frame.background);
-        let judge = Certainty::new(
-            output.as_ref(),
-            (frame.background, frame.has_veil),
-            false,
-            how.error,
-            frame.standard_errors,
-        );
-        judge.grey(light + more) - judge.grey(light) > how.target.map_or(OF_PIXEL * how.error, |all| OF_ALL * all)
-    }
-
     /// How bright a sample is, after exposure.
     fn light(&self, sample: &Sample) -> f32 {
         let gain = match self.how.space {

@@ -245,8 +245,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let material = target.material;
         // Rays to glare end at what would turn them.
         let seeing = path.calm && context.turns(material);
-        let (before, path) =
-            (&Path { calm: before.calm && !seeing, ..*before }, &Path { calm: path.calm && !seeing, ..*path });
+        let seeing = seeing.then(|| [before, path].map(|path| Path { calm: false, ..*path }));
+        let (before, path) = seeing.as_ref().map_or((before, path), |[before, path]| (before, path));
         let width = path.cone_width + path.cone_spread * hit.t;
         let mut surface = Surface::new(context.world, target, ray, hit, width);
 

@@ -17,11 +17,12 @@ mod beside;
 mod confidence;
 mod even;
 
-use super::ErrorSpace;
-use super::frame::Sum;
+use super::frame::{Frame, Sum};
+use super::{ErrorSpace, Stochastic};
 use crate::image::{Developer, Output};
 use crate::math::simd::Level;
 use crate::math::{Vec3, Vec4};
+use crate::scene::Background;
 pub(in crate::render) use beside::Pixels;
 pub(in crate::render) use confidence::factor;
 pub(in crate::render) use even::{Even, Shown};
@@ -69,6 +70,17 @@ impl<'a> Certainty<'a> {
         let developer = output.map(Developer::new);
         let gain = output.map_or(1.0, |output| libm::exp2f(output.exposure));
         Self { developer, background, has_veil, transparent, gain, error, factor, level: Level::best() }
+    }
+
+    /// Of a picture that is sampled so.
+    pub(super) fn of(
+        frame: &Frame,
+        how: &Stochastic,
+        output: Option<&'a Output>,
+        background: Option<Background>,
+    ) -> Self {
+        let transparent = matches!(background, None | Some(Background::Transparent));
+        Self::new(output, (frame.background, frame.has_veil), transparent, how.error, frame.standard_errors)
     }
 
     /// Whether samples in this range agree within the error that is allowed: nothing is seen in the pixel that could be missed.

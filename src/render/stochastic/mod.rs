@@ -26,7 +26,6 @@ use super::tile::{End, PixelFacts, TOGETHER, Tile, TilePixels};
 use super::whitted::Tracer;
 use crate::accel::Accel;
 use crate::image::Output;
-use crate::scene::Background;
 use around::Around;
 use first::First;
 use pixel::Pixel;
@@ -83,9 +82,7 @@ struct Course {
 
 impl<'a> Sampler<'a> {
     fn new(frame: &'a Frame, how: &'a Stochastic, output: Option<&'a Output>, context: &'a Context) -> Self {
-        let transparent = matches!(context.scene.background, None | Some(Background::Transparent));
-        let judge =
-            Certainty::new(output, (frame.background, frame.has_veil), transparent, how.error, frame.standard_errors);
+        let judge = Certainty::of(frame, how, output, context.scene.background);
         let fireflies = context.fireflies.as_deref();
         Self { frame, how, judge, fireflies, rounds: rounds(how, frame.settings).collect() }
     }
