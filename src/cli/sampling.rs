@@ -376,7 +376,7 @@ pub(super) fn json(settings: &Settings, sampled: &Sampled) -> Value {
             "aa": "stochastic", "pixel_error": plain(how.error), "confidence": how.confidence,
             "min_samples": how.min_samples, "max_samples": how.max_samples, "filter": how.filter.name(),
             "error_space": space(how.space),
-            "met": sampled.met, "ceiling": sampled.at_most, "rmse": sampled.rmse(), "spare": sampled.spare, "target_error": how.target.map(plain),
+            "met": sampled.met, "ceiling": sampled.at_most, "rmse": sampled.rmse(), "spare": sampled.spare, "looked": sampled.looked, "target_error": how.target.map(plain),
             "foretold": sampled.targeted.map(|to| json!({ "rmse": to.foretold, "cpu_seconds": to.foretold_cpu })),
         }),
     };

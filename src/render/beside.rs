@@ -214,7 +214,10 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
                 if path.straight || path.calm { self.leave(ray, path) } else { self.beside.missed.push(index) }
             } else if self.is_crossed(wave, i) {
                 self.continuing[class as usize].push_behind(*ray, *path, *hit);
-            } else if rays.len() < FEW || !sorted.take(context, (index, 1), hit.prim) {
+            } else if rays.len() < FEW
+                || self.sees_glare_again(path, hit)
+                || !sorted.take(context, (index, 1), hit.prim)
+            {
                 self.shade_one(traced, i);
             }
         }
@@ -230,6 +233,11 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             true => wave.touches(i) && is_same_surface(face, ray, &wave.after[i], hit),
             false => is_same_crossing(face, ray, &wave.paths[i].crossed, hit),
         }
+    }
+
+    /// Whether what lies behind a hit is seen by a path with glare that was seen without.
+    fn sees_glare_again(&self, path: &Path, hit: &Hit) -> bool {
+        path.calm && self.context.turns(&self.context.scene.materials[self.context.face(hit.prim).1 as usize])
     }
 
     /// Shades what the `i`th ray has hit.

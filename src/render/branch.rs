@@ -87,7 +87,7 @@ impl<G: Ground> Point<'_, G> {
     }
 
     /// A ray that starts here, and what it comes from: see [`Queue`](super::wave::Queue).
-    fn start(&self, class: RayClass, dir: Vec3) -> (Ray, Hit) {
+    pub(super) fn start(&self, class: RayClass, dir: Vec3) -> (Ray, Hit) {
         // Before this surface what was crossed before it would be met again.
         if class != RayClass::Refracted || self.touches {
             return (self.surface.ray(dir, self.ray.sample), Hit::MISS);

@@ -9,7 +9,7 @@ use super::frame::sample_width;
 use super::glint;
 use super::observer::Observer;
 use super::sampling::Sampling;
-use super::shade::{Band, LocalLight, bands, has_inside};
+use super::shade::{Band, LocalLight, bands};
 use super::sky::Sky;
 use super::strip::Common;
 use super::texture::TextureStore;
@@ -209,9 +209,10 @@ impl<'a> Context<'a> {
         Self { seed: settings.seed, highlight_reach, gloss, ..self.clone() }
     }
 
-    /// Whether light that passes this material goes on another way, or many.
+    /// Whether rays to glare end at this material: rays that pass it may go on another way, or many, and leave some light behind
+    /// by the angle at which they meet it.
     pub(super) fn turns(&self, material: &Material) -> bool {
-        material.reflection.transmits() && (has_inside(material) || self.gloss.spreads_far(material))
+        material.reflection.transmits()
     }
 
     /// A prim and its material.
@@ -234,19 +235,12 @@ impl<'a> Context<'a> {
         weight.max_element() >= self.cutoff_of(part)
     }
 
-    /// Whether light is worth a shadow ray, where it is such a part of what was spread: much less than a weight, as it is what is
-    /// seen in the end.
-    pub(crate) fn is_worth_a_ray(&self, light: Vec3, part: f32) -> bool {
-        const PART: f32 = 1.0 / 16.0;
-        light.max_element() >= PART * self.cutoff_of(part)
-    }
-
     /// No branch of less weight is.
     pub(crate) fn least_cutoff(&self) -> f32 {
         self.cutoff_of(1.0 / self.gloss.rays.max(1) as f32)
     }
 
-    fn cutoff_of(&self, part: f32) -> f32 {
+    pub(super) fn cutoff_of(&self, part: f32) -> f32 {
         (self.cutoff * part).max(f32::MIN_POSITIVE)
     }
 }

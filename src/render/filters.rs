@@ -8,7 +8,7 @@ use super::Settings;
 use super::absorption::Absorption;
 use super::context::Context;
 use super::optics::transmittance;
-use super::seam::is_same_crossing;
+use super::seam::{is_same_crossing, is_same_surface};
 use super::shade::{Reader, has_inside, shadow_filter};
 use super::surface::{Surface, Target};
 use super::texture::TextureStore;
@@ -31,21 +31,24 @@ pub(super) struct Inside {
 }
 
 /// Weakens light by what a surface lets through at the hit that comes next on its way, behind one that was `crossed`, which it
-/// replaces unless it is a hole. What is to arrive unbent ends at what would turn it.
+/// replaces unless it is a hole. What is to arrive unbent ends at glass, but for the surface that it has left.
 pub(super) fn weaken(
     context: &Context,
-    (ray, is_unbent): (&Ray, bool),
+    (ray, unbent): (&Ray, Option<&Hit>),
     crossed: &mut Hit,
     Passed { hit, left }: &Passed,
     light: &mut Vec3,
     inside: Option<&mut Inside>,
 ) {
+    if unbent.is_some_and(|left| hit.t <= left.t && is_same_surface(|prim| context.face(prim), ray, left, hit)) {
+        return;
+    }
     let is_repeated = is_same_crossing(|prim| context.face(prim), ray, crossed, hit);
     let (filter, is_hole) = match *left {
         Some(part) => (Vec3::splat(part), false),
         None => {
             let target = Target::new(context.scene, context.world, hit.prim);
-            let filter = match is_unbent && context.turns(target.material) {
+            let filter = match unbent.is_some() && context.turns(target.material) {
                 true => Vec3::ZERO,
                 false => filter_at(context, &target, ray, hit, inside.filter(|_| !is_repeated)),
             };

@@ -2,7 +2,7 @@
 //!
 //! A lamp behind frosted glass, or far out of focus, is met by one sample of hundreds. Pixels whose first samples all miss it
 //! agree and look certain, and are darker than they should be by all that it adds. So one sample of a part of the pixels is
-//! traced before the picture. Where some of these are fireflies, pixels near them whose own samples are spread by chance are
+//! traced before the picture, and some more of those that show something bright. Where some of these are fireflies, pixels near them whose own samples are spread by chance are
 //! not certain before they have met one, too, or so many of their samples have not that it matters little.
 
 use super::by_class::ByClass;
@@ -18,10 +18,12 @@ use super::tile::{TILE, TOGETHER, Tile, each_tile, tiles};
 use super::whitted::{Sample, Tracer};
 use super::{Job, Progress};
 use crate::accel::Accel;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Of a picture with more pixels than [`SMALL`] one in so many columns of one in so many rows is asked.
 const STEP: u32 = 2;
+/// To foretell what a picture takes one in so many of these.
+const HINT: u32 = 4;
 const SMALL: u64 = 1 << 16;
 
 /// Of a pixel that shows something bright so many more samples are taken, …
@@ -87,33 +89,70 @@ impl Asked {
     const NOTHING: Self = Self { light: 0.0, by_chance: false };
 }
 
+/// How closely a picture is looked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Closely {
+    /// Before it is rendered.
+    All,
+    /// To foretell what that takes: one pixel of sixteen of those.
+    Hint,
+}
+
+impl Closely {
+    /// One in so many columns, and rows, is asked.
+    fn step(self, width: u32, height: u32) -> u32 {
+        let step = if u64::from(width) * u64::from(height) > SMALL { STEP } else { 1 };
+        match self {
+            Self::All => step,
+            Self::Hint => step * HINT,
+        }
+    }
+
+    /// How many times the rays before a rendering are as many.
+    pub(super) fn part(self) -> u64 {
+        match self {
+            Self::All => 1,
+            Self::Hint => u64::from(HINT * HINT),
+        }
+    }
+}
+
 /// Looks for them where pixels are sampled until they are certain and rays may be spread by chance, and tells the context; eye
 /// rays that it took, and the counts of all threads.
-pub(super) fn look<P: Observer>(job: &Job, context: &mut Context, progress: &dyn Progress) -> (u64, Vec<ByClass<P>>) {
+pub(super) fn look<P: Observer>(
+    job: &Job,
+    context: &mut Context,
+    closely: Closely,
+    progress: &dyn Progress,
+) -> (u64, Vec<ByClass<P>>) {
     let Job { accel, view, settings, .. } = *job;
     let Sampling::Stochastic(how) = &settings.sampling else { return (0, Vec::new()) };
     if !context.meets_by_chance {
         return (0, Vec::new());
     }
     let (width, height) = (settings.width, settings.height);
-    let step = if u64::from(width) * u64::from(height) > SMALL { STEP } else { 1 };
+    let step = closely.step(width, height);
     let question = Question { frame: &Frame::new(context, accel, view, settings), how, step };
-    let work = |tracer: &mut Tracer<_, P>, &tile: &Tile| question.ask(tracer, tile);
-    let (answers, mut counts, complete) = each_tile(context, accel, &tiles(width, height), &Quiet(progress), work);
-    let mut rays = answers.iter().map(Vec::len).sum::<usize>() as u64;
+    let asked = Mutex::new(Grid::new(width.div_ceil(step) as usize, height.div_ceil(step) as usize));
+    let work = |tracer: &mut Tracer<_, P>, &tile: &Tile| {
+        let answers = question.ask(tracer, tile)?;
+        asked.lock().unwrap_or_else(PoisonError::into_inner).put(&answers, step);
+        Some(answers.len() as u64)
+    };
+    let (each, mut counts, complete) = each_tile(context, accel, &tiles(width, height), &Quiet(progress), work);
+    let mut rays = each.into_iter().sum();
     // Who has cancelled wants no more of the picture, either.
     if !complete {
         return (rays, counts);
     }
-    let (columns, rows) = (width.div_ceil(step) as usize, height.div_ceil(step) as usize);
-    let asked = Grid::of(columns, rows, answers.into_iter().flatten(), step);
+    let asked = asked.into_inner().unwrap_or_else(PoisonError::into_inner);
     let bright = asked.bright(step);
     let some: Vec<&[Bright]> = bright.chunks(TOGETHER / AGAIN as usize).collect();
     let work = |tracer: &mut Tracer<_, P>, some: &&[Bright]| question.ask_again(tracer, some);
     let (answers, more, complete) = each_tile(context, accel, &some, &Quiet(progress), work);
-    rays += bright.len() as u64 * u64::from(AGAIN);
     counts.extend(more);
     if complete {
+        rays += bright.len() as u64 * u64::from(AGAIN);
         let (rare, told) = (answers.into_iter().flatten().collect(), asked.in_tiles((TILE / step) as usize));
         let output = output(how.space, question.frame.background);
         let judge = Certainty::of(question.frame, how, output.as_ref(), context.scene.background);
@@ -190,10 +229,14 @@ struct Grid {
 }
 
 impl Grid {
-    fn of(columns: usize, rows: usize, asked: impl Iterator<Item = ((u32, u32), Asked)>, step: u32) -> Self {
-        let mut each = vec![Asked::NOTHING; columns * rows];
-        asked.for_each(|((x, y), asked)| each[(y / step) as usize * columns + (x / step) as usize] = asked);
-        Self { columns, rows, each }
+    fn new(columns: usize, rows: usize) -> Self {
+        Self { columns, rows, each: vec![Asked::NOTHING; columns * rows] }
+    }
+
+    fn put(&mut self, answers: &[((u32, u32), Asked)], step: u32) {
+        for &((x, y), asked) in answers {
+            self.each[(y / step) as usize * self.columns + (x / step) as usize] = asked;
+        }
     }
 
     /// What was asked of each tile of so many columns and rows of samples, of what may have met something by chance; and tiles in

@@ -1,10 +1,11 @@
 //! What a picture will take and how wrong it will be, foretold from a part of it.
 
 use super::context::Context;
+use super::fireflies::{self, Closely};
 use super::part::{Measure, Part, Quiet, squared_errors, squares};
 use super::sampling::Sampling;
+use super::target;
 use super::{Job, Progress, Settings};
-use super::{fireflies, target};
 use crate::accel::{NoProbe, RayCounts};
 use crate::stopwatch::Stopwatch;
 
@@ -67,7 +68,7 @@ pub struct Forecast {
 pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
     let mut context = Context::new(job.scene, job.world, job.textures, job.settings);
     let watch = Stopwatch::of_all_threads();
-    let (looked, _) = fireflies::look::<NoProbe>(job, &mut context, &Quiet(progress));
+    let (looked, _) = fireflies::look::<NoProbe>(job, &mut context, Closely::Hint, &Quiet(progress));
     let spent = watch.read().cpu.as_secs_f64();
     // What is asked for as an error is first found out how to reach; the rendering will do that again.
     let (settings, work, before) = match job.settings.sampling {
@@ -77,7 +78,8 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
         }
         _ => (job.settings.clone(), 1.0, (0.0, 0.0)),
     };
-    let before = (before.0 + looked as f64, before.1 + if looked > 0 { spent } else { 0.0 });
+    let times = Closely::Hint.part() as f64;
+    let before = (before.0 + looked as f64 * times, before.1 + if looked > 0 { spent * times } else { 0.0 });
     let squares = squares(settings.width, settings.height);
     let timed = Part::<NoProbe>::render(job, &context, &settings, &squares, progress)?;
     let other = Settings { seed: target::seed(settings.seed, 1), ..settings.clone() };

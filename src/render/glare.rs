@@ -10,8 +10,8 @@ use super::branch::{Ground, Point, Rough};
 use super::context::Context;
 use super::draws::Purpose;
 use super::observer::Observer;
-use super::shade::{Lobe, Seen};
-use super::wave::{Crossing, Media};
+use super::shade::{Lobe, Seen, above};
+use super::wave::{Crossing, Media, RayClass};
 use super::whitted::Tracer;
 use crate::accel::Accel;
 use crate::math::Vec3;
@@ -54,8 +54,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         for k in 0..rough.rays {
             let Some((dir, radiance)) = context.sky.to_glare(spread.point(k)) else { continue };
             let mirrors = seen.normal.dot(dir) > 0.0;
-            // Normals and the face itself may not agree on the side.
-            if mirrors != (seen.geometric.dot(dir) > 0.0) || !(if mirrors { calm.mirrored } else { calm.through }) {
+            if !(if mirrors { calm.mirrored } else { calm.through }) {
                 continue;
             }
             let shown = if mirrors {
@@ -64,10 +63,17 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
                 let_through(point, crossing, &rough.lobe, dir)
             };
             let light = point.path.weight * shown * radiance * part;
-            if light.is_finite() && context.is_worth_a_ray(light, point.path.part * part) {
+            if light.is_finite() && context.sky.is_worth_a_ray(light, context.cutoff_of(point.path.part * part)) {
                 let media = if mirrors { point.path.media } else { crossing.beyond };
                 let media = context.absorption.is_some().then_some(media);
-                self.glares.push(point.surface.ray(dir, point.ray.sample), light, media);
+                // Normals and the face itself may not agree on the side.
+                let (class, side) = if mirrors {
+                    (RayClass::Reflected, seen.geometric)
+                } else {
+                    (RayClass::Refracted, -seen.geometric)
+                };
+                let (ray, left) = point.start(class, above(dir, side));
+                self.glares.push_unbent(ray, left, light, media);
             }
         }
         calm

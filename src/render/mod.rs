@@ -81,6 +81,7 @@ use crate::accel::{AnyAccel, NoProbe, RayCounts};
 use crate::image::Picture;
 use crate::scene::Scene;
 use context::Context;
+use fireflies::Closely;
 use observer::Observer;
 use texture::TextureStore;
 
@@ -257,7 +258,7 @@ fn render_with<P: Observer>(
     let settings = job.settings;
     let mut context = Context::new(job.scene, job.world, job.textures, settings);
     prepared();
-    let (rays, more) = fireflies::look(job, &mut context, progress);
+    let (rays, more) = fireflies::look(job, &mut context, Closely::All, progress);
     let (mut rendered, mut counts) = match &settings.sampling {
         Sampling::Stochastic(how) if how.target.is_some() => target::render(job, &context, how, progress),
         _ => None,

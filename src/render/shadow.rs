@@ -20,8 +20,9 @@ pub(crate) struct Shadows {
     light: Tail<Bound>,
     /// What each is inside of; empty where nothing absorbs light.
     inside: Vec<Inside>,
-    /// Whether they end at what would bend or spread them.
-    is_unbent: bool,
+    /// Of rays that end at what would bend or spread them the hit that each has left, with `t` as far as it may meet the same
+    /// surface again.
+    unbent: Vec<Hit>,
     /// The ways up to where some of the rays start, and which those are.
     risers: Vec<Ray>,
     raised: Vec<usize>,
@@ -48,11 +49,6 @@ pub(crate) struct Bound {
 }
 
 impl Shadows {
-    /// For rays that end at what would bend or spread them.
-    pub(crate) fn unbent() -> Self {
-        Self { is_unbent: true, ..Self::default() }
-    }
-
     pub(crate) fn len(&self) -> usize {
         self.rays.len()
     }
@@ -70,6 +66,13 @@ impl Shadows {
             self.risers.push(riser);
         }
         self.push(feelers.ray, light, media);
+    }
+
+    /// The same as [`Self::push`] of a ray that ends at glass, and has left this hit, with `t` as far as it may meet the same
+    /// surface again: all rays, or none.
+    pub(crate) fn push_unbent(&mut self, ray: Ray, left: Hit, light: Vec3, media: Option<Media>) {
+        self.push(ray, light, media);
+        self.unbent.push(left);
     }
 
     /// The same as [`Self::push`] of light that need not be bound for the ray's sample.
@@ -96,6 +99,7 @@ impl Shadows {
         self.rays.clear();
         self.light.clear();
         self.inside.clear();
+        self.unbent.clear();
         self.risers.clear();
         self.raised.clear();
     }
@@ -147,7 +151,14 @@ impl Shadows {
             met.list(noted, &mut self.in_order);
             let (light, mut crossed) = (&mut self.light[i].radiance, Hit::MISS);
             for passed in &self.in_order {
-                weaken(context, (&self.rays[i], self.is_unbent), &mut crossed, passed, light, self.inside.get_mut(i));
+                weaken(
+                    context,
+                    (&self.rays[i], self.unbent.get(i)),
+                    &mut crossed,
+                    passed,
+                    light,
+                    self.inside.get_mut(i),
+                );
                 self.blocked[i] = is_dark(*light);
                 if self.blocked[i] {
                     break;
@@ -223,7 +234,7 @@ impl Shadows {
                 continue;
             }
             let (ray, light, mut crossed) = (self.on_way[k], &mut self.light[i].radiance, self.crossed[k]);
-            weaken(context, (&ray, self.is_unbent), &mut crossed, &hit.into(), light, self.inside.get_mut(i));
+            weaken(context, (&ray, self.unbent.get(i)), &mut crossed, &hit.into(), light, self.inside.get_mut(i));
             self.blocked[i] = is_dark(*light);
             if self.blocked[i] {
                 continue;

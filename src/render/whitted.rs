@@ -86,7 +86,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             wave: Wave::default(),
             beside: Beside::default(),
             shadows: Shadows::default(),
-            glares: Shadows::unbent(),
+            glares: Shadows::default(),
             arounds: Arounds::default(),
             samples: Vec::new(),
             streams: Vec::new(),

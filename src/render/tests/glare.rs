@@ -80,7 +80,7 @@ fn four_rays_see_the_sun_through_a_frosted_pane_as_bright_as_all_of_its_facets_d
 }
 
 #[test]
-fn what_shows_a_sun_in_part_weakens_it_and_what_bends_its_light_shows_it_to_spread_rays() {
+fn what_covers_in_part_halves_a_sun_and_glass_shows_it_to_the_rays_that_are_spread() {
     let shown = |add: &dyn Fn(&mut Stage)| {
         let (sky, ..) = sun(10);
         let mut s = under(sky, -0.5);
@@ -112,6 +112,72 @@ fn what_shows_a_sun_in_part_weakens_it_and_what_bends_its_light_shows_it_to_spre
         s.mesh(both, DAffine3::IDENTITY, slab.clone());
     });
     assert!(bent / open > 0.8 && bent / open < 1.0, "{bent} of {open}");
+    let clear = rough(MetalRough { metallic: 0.0, transmission: 1.0, roughness: 0.0, ..MetalRough::default() });
+    let thin = shown(&|s| {
+        s.square(1.0, 9.0, clear.clone());
+    });
+    assert!(thin / open > 0.8 && thin / open < 1.0, "{thin} of {open}");
+}
+
+#[test]
+fn what_touches_a_frosted_pane_from_behind_hides_the_sun() {
+    let (sky, ..) = sun(2);
+    let mut s = under(sky, -0.5);
+    s.square(0.0, 9.0, frosted(0.5)).square(0.0, 9.0, unlit(Vec3::ZERO));
+    assert!(s.color().x < 0.1, "{}", s.color());
+}
+
+#[test]
+fn the_sun_of_a_dim_sky_is_as_much_brighter_than_the_rest_as_that_of_a_bright_one() {
+    let of = |scale: f32| {
+        let (mut sky, ..) = sun(2);
+        sky.texels = Arc::new(sky.texels.iter().map(|texel| texel.map(|light| light * scale)).collect());
+        let mut s = under(sky, -0.5);
+        s.settings.cutoff = 1.0 / 512.0;
+        s.square(0.0, 9.0, frosted(0.5));
+        s.color().x / scale
+    };
+    let (bright, dim) = (of(1.0), of(1.0 / 1_048_576.0));
+    assert!((dim / bright - 1.0).abs() < 1e-5, "{dim} for {bright}");
+}
+
+/// A frosted pane, and behind it a thing of glass that rays pass as they come.
+fn before_glass(thing: MetalRough, opacity: f32) -> Stage {
+    let (sky, ..) = sun(10);
+    let mut s = under(sky, -0.5);
+    s.view = View::look_at(DVec3::Z * -3.0, DVec3::ZERO, DVec3::Y, Lens::orthographic(2.0));
+    s.square(0.0, 9.0, frosted(0.5));
+    let glass = rough(thing);
+    let alpha_mode = if opacity < 1.0 { crate::scene::AlphaMode::Blend } else { glass.alpha_mode };
+    s.sphere(DVec3::Z * 2.0, 1.0, Material { opacity, alpha_mode, ..glass });
+    (s.settings.width, s.settings.height, s.settings.samples, s.settings.gloss_rays) = (12, 12, 256, Some(1));
+    s
+}
+
+#[test]
+fn a_sun_behind_glass_is_seen_alike_by_points_one_by_one_and_side_by_side() {
+    let air = MetalRough {
+        transmission: 1.0,
+        thick: true,
+        thickness: 1.0,
+        ior: 1.0,
+        roughness: 0.0,
+        metallic: 0.0,
+        ..MetalRough::default()
+    };
+    let frost = MetalRough { transmission: 1.0, roughness: 0.4, metallic: 0.0, ..MetalRough::default() };
+    for (thing, opacity) in [(air, 1.0), (frost, 0.3)] {
+        let mut s = before_glass(thing, opacity);
+        let beside = s.render().picture.beauty;
+        s.settings.one_by_one = true;
+        assert!(s.render().picture.beauty == beside, "{opacity}");
+        if opacity == 1.0 {
+            s.scene.spheres.clear();
+            let mean = |pixels: &[[f32; 4]]| pixels.iter().map(|pixel| pixel[0]).sum::<f32>() / pixels.len() as f32;
+            let (through, open) = (mean(&beside), mean(&s.render().picture.beauty));
+            assert!((through / open - 1.0).abs() < 0.1, "{through} of {open}");
+        }
+    }
 }
 
 /// Mean of a picture as it is written, and of one that has so many samples in every pixel.
