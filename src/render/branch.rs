@@ -204,8 +204,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let balance =
             if self.splits(point) { self.split_balance(point, cosine) } else { point.matter.balance(cosine, crossing) };
         let mirrored = reflect(-view, facet);
-        // What other facets stop goes on through glass, and what runs into glass again comes out after all.
-        let share = (balance.reflected - balance.glass) * rough.lobe.sent(view, mirrored) + balance.glass;
+        let share = balance.mirrored(rough.lobe.sent(view, mirrored));
         let to = above(mirrored, normal);
         if share != Vec3::ZERO && normal.dot(to) > 0.0 {
             let weight = point.path.weight * share * (1.0 / rough.rays as f32);

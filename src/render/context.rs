@@ -140,10 +140,9 @@ impl<'a> Context<'a> {
         let together = samples_together(settings);
         let gloss = Gloss::new(settings.gloss_rays).shared_by(together).of_samples(settings);
         let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, gloss.all, settings.cutoff));
-        let meets_by_chance = |m: &Material| gloss.spreads_far(m);
-        let meets_by_chance = depth > 0 && scene.materials.iter().any(meets_by_chance);
+        let spreads = depth > 0 && scene.materials.iter().any(|material| gloss.spreads_far(material));
         let mut sky = Sky::new(scene);
-        if meets_by_chance {
+        if spreads {
             sky.find_glare();
         }
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
@@ -163,7 +162,7 @@ impl<'a> Context<'a> {
             env_rays,
             light_rays,
             gloss,
-            meets_by_chance: settings.lens.is_some() || meets_by_chance,
+            meets_by_chance: settings.lens.is_some() || spreads,
             fireflies: None,
             highlight_reach: glint::reach(settings),
             seed: settings.seed,

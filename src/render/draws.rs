@@ -117,7 +117,14 @@ mod tests {
         assert_eq!(first(0, 1.0), first(0, 1.0));
         assert_ne!(first(0, 1.0), first(1, 1.0));
         assert_ne!(first(0, 1.0), first(0, 1.0 + f32::EPSILON));
-        let all = [Purpose::Lights, Purpose::Facets, Purpose::Surroundings, Purpose::Roulette, Purpose::Shadows];
+        let all = [
+            Purpose::Lights,
+            Purpose::Facets,
+            Purpose::Surroundings,
+            Purpose::Roulette,
+            Purpose::Shadows,
+            Purpose::Glare,
+        ];
         let mut points = all.map(|purpose| {
             let mut draws = Draws::at(0, &[], 0, &ray(1.0), &Hit { t: 1.0, ..Hit::MISS }, purpose);
             draws.spread(1).point(0).map(f32::to_bits)

@@ -12,7 +12,7 @@ use super::frame::{Frame, pixel_key};
 use super::observer::Observer;
 use super::part::Quiet;
 use super::roulette::Roulette;
-use super::sampling::{ErrorSpace, Sampling, Stochastic};
+use super::sampling::{Sampling, Stochastic};
 use super::stochastic::{Places, Wanted};
 use super::tile::{TILE, TOGETHER, Tile, each_tile, tiles};
 use super::whitted::{Sample, Tracer};
@@ -188,11 +188,7 @@ struct Question<'a> {
 impl Question<'_> {
     /// How bright a sample is, after exposure.
     fn light(&self, sample: &Sample) -> f32 {
-        let gain = match self.how.space {
-            ErrorSpace::Linear => 1.0,
-            ErrorSpace::Display { exposure, .. } => libm::exp2f(exposure),
-        };
-        let light = sample.radiance.max_element() * gain;
+        let light = sample.radiance.max_element() * self.how.space.gain();
         if light.is_finite() { light } else { 0.0 }
     }
 

@@ -84,8 +84,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
 fn mirrored<G: Ground>(point: &Point<G>, crossing: &Crossing, lobe: &Lobe, dir: Vec3) -> Vec3 {
     let Seen { view, .. } = point.surface.seen();
     let Some((facet, density)) = lobe.facet_to(view, dir) else { return Vec3::ZERO };
-    let balance = point.matter.balance(view.dot(facet), crossing);
-    ((balance.reflected - balance.glass) * lobe.sent(view, dir) + balance.glass) * density
+    point.matter.balance(view.dot(facet), crossing).mirrored(lobe.sent(view, dir)) * density
 }
 
 /// What they let through.

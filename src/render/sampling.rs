@@ -129,6 +129,16 @@ pub enum ErrorSpace {
     },
 }
 
+impl ErrorSpace {
+    /// By how much light is multiplied before errors are counted.
+    pub(super) fn gain(self) -> f32 {
+        match self {
+            Self::Linear => 1.0,
+            Self::Display { exposure, .. } => libm::exp2f(exposure),
+        }
+    }
+}
+
 impl Default for ErrorSpace {
     fn default() -> Self {
         Self::Display { tone_map: ToneMap::default(), exposure: 0.0 }

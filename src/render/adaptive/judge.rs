@@ -4,7 +4,7 @@ use crate::image::Developer;
 use crate::math::Vec3;
 use crate::render::certainty::output;
 use crate::render::frame::Frame;
-use crate::render::sampling::{Adaptive, ErrorSpace, Split};
+use crate::render::sampling::{Adaptive, Split};
 use crate::render::whitted::Sample;
 
 /// Linear light over the background, and the share of a missing one: the numbers that are compared.
@@ -42,11 +42,8 @@ pub(super) struct Judge {
 
 impl Judge {
     pub(super) fn new(frame: &Frame, how: &Adaptive) -> Self {
-        let gain = match how.space {
-            ErrorSpace::Linear => 1.0,
-            ErrorSpace::Display { exposure, .. } => libm::exp2f(exposure),
-        };
         let curve = output(how.space, Some(Vec3::ZERO)).map(|output| Curve::new(&Developer::new(&output)));
+        let gain = how.space.gain();
         Self { split: how.split, threshold: how.threshold, gain, curve, background: frame.background }
     }
 
@@ -126,6 +123,7 @@ impl Curve {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::sampling::ErrorSpace;
 
     #[test]
     fn the_table_is_the_curve_of_greys() {

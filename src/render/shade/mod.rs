@@ -104,6 +104,12 @@ impl Balance {
     pub(crate) fn smooth(reflected: Vec3, refracted: Vec3) -> Self {
         Self { reflected, refracted, glass: Vec3::ZERO }
     }
+
+    /// What is mirrored where other facets leave this share: what they stop goes on through glass, and what runs into glass
+    /// again comes out after all.
+    pub(crate) fn mirrored(&self, kept: f32) -> Vec3 {
+        (self.reflected - self.glass) * kept + self.glass
+    }
 }
 
 /// Reads the maps of one point.
