@@ -6,8 +6,8 @@ use super::codes::Code;
 use super::document::is_semantic;
 use super::report::Report;
 use super::schema::{list, position, whole};
+use super::tree::{Map, Value};
 use super::variants;
-use serde_json::{Map, Value};
 use std::collections::HashMap;
 
 /// Types of components (glTF 2.0, §3.6.2.2).
@@ -24,7 +24,7 @@ const ELEMENT_ARRAY_BUFFER: u64 = 34963;
 
 /// Checks every primitive, with the material that it shows in a variant.
 pub(super) fn check(root: &Value, variant: Option<usize>, report: &mut Report) {
-    let quantized = list(root, "extensionsUsed").iter().any(|e| e == "KHR_mesh_quantization");
+    let quantized = list(root, "extensionsUsed").iter().any(|e| e.as_str() == Some("KHR_mesh_quantization"));
     let mut check = Check { root, variant, quantized, views: HashMap::new(), maps: HashMap::new(), report };
     for (i, mesh) in list(root, "meshes").iter().enumerate() {
         let targets: Vec<usize> = list(mesh, "primitives").iter().map(|p| list(p, "targets").len()).collect();
@@ -52,7 +52,7 @@ struct Shape<'a> {
     normalized: bool,
     count: u64,
     offset: u64,
-    view: Option<(usize, &'a Value)>,
+    view: Option<(usize, &'a Value<'a>)>,
     bounded: bool,
 }
 
@@ -64,7 +64,7 @@ struct Layout<'a> {
 }
 
 struct Check<'a> {
-    root: &'a Value,
+    root: &'a Value<'a>,
     /// The variant of materials that is asked for.
     variant: Option<usize>,
     quantized: bool,
@@ -76,8 +76,8 @@ struct Check<'a> {
 }
 
 impl<'a> Check<'a> {
-    fn primitive(&mut self, primitive: &'a Value, place: &str) {
-        let empty = Map::new();
+    fn primitive(&mut self, primitive: &'a Value<'a>, place: &str) {
+        let empty = Map::default();
         let attributes = primitive.get("attributes").and_then(Value::as_object).unwrap_or(&empty);
         let at = format!("{place}.attributes");
         if !attributes.is_empty() && !attributes.contains_key("POSITION") {
@@ -94,7 +94,7 @@ impl<'a> Check<'a> {
         let is_compressed = primitive.pointer("/extensions/KHR_draco_mesh_compression").is_some();
         let position = attributes.get("POSITION").and_then(|index| self.shape(index));
         let mut vertices = position.map(|shape| shape.count);
-        for (name, index) in attributes {
+        for (name, index) in attributes.iter() {
             let place = format!("{at}.{}", crate::load::paths::shorten(name));
             let Some(shape) = self.shape(index) else { continue };
             self.attribute(name, &shape, &place, false);
@@ -118,10 +118,10 @@ impl<'a> Check<'a> {
     }
 
     /// Numbered sets must be 0, 1, 2, …, and joints go with weights.
-    fn sets(&mut self, attributes: &Map<String, Value>, at: &str) {
+    fn sets(&mut self, attributes: &Map, at: &str) {
         let mut counts = Vec::new();
         for prefix in ["TEXCOORD_", "COLOR_", "JOINTS_", "WEIGHTS_"] {
-            let known = attributes.keys().filter(|name| is_semantic(name));
+            let known = attributes.iter().map(|(name, _)| name).filter(|name| is_semantic(name));
             let sets: Vec<u16> = known.filter_map(|name| name.strip_prefix(prefix)?.parse::<u16>().ok()).collect();
             if sets.iter().max().is_some_and(|&max| usize::from(max) + 1 != sets.len()) {
                 let text = format!("the {prefix} sets are not numbered 0, 1, 2, …");
@@ -195,7 +195,7 @@ impl<'a> Check<'a> {
     }
 
     /// Checks the indices and says how many there are.
-    fn indices(&mut self, primitive: &'a Value, place: &str) -> Option<u64> {
+    fn indices(&mut self, primitive: &'a Value<'a>, place: &str) -> Option<u64> {
         let place = format!("{place}.indices");
         let shape = self.shape(primitive.get("indices")?)?;
         if shape.kind != "SCALAR"
@@ -236,8 +236,8 @@ impl<'a> Check<'a> {
         }
     }
 
-    fn target(&mut self, target: &'a Value, base: &Map<String, Value>, vertices: Option<u64>, place: &str) {
-        for (name, index) in target.as_object().into_iter().flatten() {
+    fn target(&mut self, target: &'a Value<'a>, base: &Map, vertices: Option<u64>, place: &str) {
+        for (name, index) in target.as_object().into_iter().flat_map(Map::iter) {
             let place = format!("{place}.{}", crate::load::paths::shorten(name));
             let morphable = !["JOINTS_", "WEIGHTS_"].iter().any(|p| name.starts_with(p));
             if !(name.starts_with('_') || is_semantic(name) && morphable) {
@@ -259,7 +259,7 @@ impl<'a> Check<'a> {
     }
 
     /// Whether the primitive has what its material's maps need.
-    fn material(&mut self, primitive: &Value, attributes: &Map<String, Value>, place: &str) {
+    fn material(&mut self, primitive: &Value, attributes: &Map, place: &str) {
         let place = format!("{place}.material");
         let index = variants::material_in(primitive, self.variant);
         let Some(material) = index.and_then(|i| list(self.root, "materials").get(i)) else { return };
@@ -351,7 +351,7 @@ fn fit(name: &str, shape: &Shape, morph: bool) -> Fit {
 }
 
 /// The maps of a material by their texture coordinates.
-fn layouts<'a>(material: &'a Value) -> Vec<Layout<'a>> {
+fn layouts<'a>(material: &'a Value<'a>) -> Vec<Layout<'a>> {
     /// Names of maps in one message; materials have no more.
     const LISTED: usize = 20;
     let mut slots = Vec::new();
@@ -365,8 +365,8 @@ fn layouts<'a>(material: &'a Value) -> Vec<Layout<'a>> {
 }
 
 /// Every map of a material, extensions included, with its texture coordinate set.
-fn texture_slots<'a>(value: &'a Value, out: &mut Vec<(&'a str, u64)>) {
-    for (name, value) in value.as_object().into_iter().flatten() {
+fn texture_slots<'a>(value: &'a Value<'a>, out: &mut Vec<(&'a str, u64)>) {
+    for (name, value) in value.as_object().into_iter().flat_map(Map::iter) {
         if name.ends_with("Texture") && value.get("index").is_some() {
             let moved = value.pointer("/extensions/KHR_texture_transform/texCoord");
             let set = moved.or_else(|| value.get("texCoord")).and_then(whole).unwrap_or(0);

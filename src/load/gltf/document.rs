@@ -8,10 +8,11 @@ use super::codes::Code;
 use super::morphs::Morphs;
 use super::report::Report;
 use super::schema;
+use super::tree::{Map, Value};
 use super::weight::{DEEPEST, Weight};
 use gltf::json::{Camera, Root};
 use serde::Deserialize;
-use serde_json::{Map, Number, Value, json};
+use serde_json::Number;
 use std::borrow::Cow;
 
 /// A document whose types and indices are right.
@@ -43,7 +44,7 @@ pub(super) fn text<'a>(json: &'a [u8], report: &mut Report) -> Cow<'a, str> {
 }
 
 /// Parses JSON; `None` when that is impossible, with the reason in `report`.
-pub(super) fn parse(text: &str, report: &mut Report) -> Option<Value> {
+pub(super) fn parse<'a>(text: &'a str, report: &mut Report) -> Option<Value<'a>> {
     // GLB pads its JSON with spaces; some exporters use zeros.
     match serde_json::from_str(text.trim_end_matches('\0')) {
         Ok(value) => Some(value),
@@ -62,25 +63,23 @@ pub(super) fn typed(mut value: Value, bytes: u64, report: &mut Report) -> Option
     simplify(&mut value);
     let map = value.as_object_mut()?;
     map.remove("animations");
-    each(map, "scenes", |scene| {
-        scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
-    });
+    each(map, "scenes", |scene| scene.insert_missing("nodes", || Value::Array(Vec::new())));
     each(map, "meshes", |mesh| each(mesh, "primitives", known_attributes));
     if let Some(lights) = map.get_mut("extensions").and_then(|e| e.get_mut("KHR_lights_punctual")) {
         lights
             .as_object_mut()
             .into_iter()
-            .for_each(|lights| each(lights, "lights", |light| drop(light.remove("extensions"))));
+            .for_each(|lights| each(lights, "lights", |light| light.remove("extensions")));
     }
     let views = map.get("bufferViews").and_then(Value::as_array).map_or(0, Vec::len);
     let images = map.get_mut("images").and_then(Value::as_array_mut).into_iter().flatten();
-    images.filter(|image| !is_image(image, views)).for_each(|image| *image = Value::Object(Map::new()));
+    images.filter(|image| !is_image(image, views)).for_each(|image| *image = Value::Object(Map::default()));
     each(map, "cameras", planes);
     let cameras = map.get_mut("cameras").and_then(Value::as_array_mut).into_iter().flatten();
-    let is_camera = |camera: &Value| Camera::deserialize(camera).is_ok();
-    cameras.filter(|camera| !is_camera(camera)).for_each(|camera| *camera = json!({"type": "perspective"}));
+    let is_camera = |camera: &Value| Camera::deserialize(camera.clone()).is_ok();
+    cameras.filter(|camera| !is_camera(camera)).for_each(|camera| *camera = blank("perspective"));
     let (originals, morphs) = (Originals::of(&value, &animations), Morphs::of(&value));
-    match serde_json::from_value(value) {
+    match Root::deserialize(value) {
         Ok(root) => Some(Document { root, bytes, animations, originals, morphs }),
         Err(e) => {
             report.refuse(Code::TypeMismatch, "", format!("the JSON is not glTF 2.0: {e}"));
@@ -89,19 +88,24 @@ pub(super) fn typed(mut value: Value, bytes: u64, report: &mut Report) -> Option
     }
 }
 
+/// An object that says its type.
+fn blank(kind: &'static str) -> Value<'static> {
+    Value::Object([("type", Value::String(kind.into()))].into_iter().collect())
+}
+
 /// Whether an image entry has the right types and refers to what is there.
 fn is_image(value: &Value, views: usize) -> bool {
-    let text = |name| value.get(name).is_none_or(Value::is_string);
+    let text = |name| value.get(name).is_none_or(|text| text.as_str().is_some());
     let view = |v: &Value| schema::whole(v).is_some_and(|index| index < views as u64);
     value.is_object() && text("uri") && text("mimeType") && text("name") && value.get("bufferView").is_none_or(view)
 }
 
 /// Gives a camera the planes that it must have and that rays do not need, which is told elsewhere.
-fn planes(camera: &mut Map<String, Value>) {
-    let mut need = |lens: &str, planes: &[(&str, f32)]| {
+fn planes(camera: &mut Map) {
+    let mut need = |lens: &str, planes: &[(&'static str, f32)]| {
         if let Some(lens) = camera.get_mut(lens).and_then(Value::as_object_mut) {
-            for (plane, at) in planes {
-                lens.entry(*plane).or_insert_with(|| json!(at));
+            for &(plane, at) in planes {
+                lens.insert_missing(plane, || f64::from(at).into());
             }
         }
     };
@@ -110,7 +114,7 @@ fn planes(camera: &mut Map<String, Value>) {
 }
 
 /// Does something to each object in a list.
-fn each(map: &mut Map<String, Value>, list: &str, change: impl FnMut(&mut Map<String, Value>)) {
+fn each<'a>(map: &mut Map<'a>, list: &str, change: impl FnMut(&mut Map<'a>)) {
     let elements = map.get_mut(list).and_then(Value::as_array_mut).into_iter().flatten();
     elements.filter_map(Value::as_object_mut).for_each(change);
 }
@@ -121,7 +125,7 @@ fn simplify(value: &mut Value) {
     match value {
         Value::Object(map) => {
             map.remove("extras");
-            map.values_mut().for_each(simplify);
+            map.iter_mut().for_each(|(_, value)| simplify(value));
         }
         Value::Array(list) => list.iter_mut().for_each(simplify),
         Value::Number(number) if number.is_f64() => {
@@ -134,8 +138,8 @@ fn simplify(value: &mut Value) {
 }
 
 /// Keeps the attributes whose names mean something; `TEXCOORD_01` would be taken for `TEXCOORD_1`.
-fn known_attributes(primitive: &mut Map<String, Value>) {
-    let clean = |attributes: &mut Map<String, Value>| attributes.retain(|name, _| is_semantic(name));
+fn known_attributes(primitive: &mut Map) {
+    let clean = |attributes: &mut Map| attributes.retain(|name, _| is_semantic(name));
     primitive.get_mut("attributes").and_then(Value::as_object_mut).into_iter().for_each(clean);
     let targets = primitive.get_mut("targets").and_then(Value::as_array_mut).into_iter().flatten();
     targets.filter_map(Value::as_object_mut).for_each(clean);

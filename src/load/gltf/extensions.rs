@@ -2,9 +2,9 @@
 
 use super::codes::Code;
 use super::report::Report;
+use super::tree::Value;
 use crate::load::Diagnostic;
 use crate::load::paths::shorten;
-use serde_json::Value;
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -198,9 +198,9 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    fn messages(root: &Value) -> (Vec<String>, Vec<String>) {
+    fn messages(root: serde_json::Value) -> (Vec<String>, Vec<String>) {
         let mut report = Report::new(Path::new("a.gltf"));
-        Lists::of(root).check(Path::new("a.gltf"), &mut report);
+        Lists::of(&root.into()).check(Path::new("a.gltf"), &mut report);
         let warnings = report.warnings.clone().into_vec().iter().map(ToString::to_string).collect();
         match report.check() {
             Err(crate::load::LoadError::Input(faults)) => (faults.iter().map(ToString::to_string).collect(), warnings),
@@ -211,7 +211,7 @@ mod tests {
     #[test]
     fn what_is_required_and_unknown_is_one_line_with_a_remedy() {
         let both = json!(["KHR_materials_subsurface", "KHR_materials_ior"]);
-        let (faults, warnings) = messages(&json!({"extensionsUsed": both, "extensionsRequired": both}));
+        let (faults, warnings) = messages(json!({"extensionsUsed": both, "extensionsRequired": both}));
         assert_eq!(faults.len(), 1);
         assert!(
             faults[0].starts_with("a.gltf:extensionsRequired: KHR_materials_subsurface is required"),
@@ -226,7 +226,7 @@ mod tests {
     fn what_is_only_used_is_one_warning_and_nothing_when_harmless() {
         let used =
             json!(["KHR_materials_subsurface", "KHR_xmp", "KHR_materials_volume_scatter", "KHR_texture_transform"]);
-        let (faults, warnings) = messages(&json!({ "extensionsUsed": used }));
+        let (faults, warnings) = messages(json!({ "extensionsUsed": used }));
         assert!(faults.is_empty());
         assert_eq!(
             warnings,
@@ -237,10 +237,10 @@ mod tests {
     #[test]
     fn a_hundred_thousand_names_are_told_in_a_few_lines() {
         let names: Vec<String> = (0..100_000).map(|i| format!("MANY_{i}")).collect();
-        let (_, warnings) = messages(&json!({ "extensionsUsed": names }));
+        let (_, warnings) = messages(json!({ "extensionsUsed": names }));
         assert_eq!(warnings.len(), 1);
         assert!(warnings[0].ends_with("MANY_19 and 99980 more"), "{}", warnings[0]);
-        let (faults, warnings) = messages(&json!({ "extensionsRequired": names }));
+        let (faults, warnings) = messages(json!({ "extensionsRequired": names }));
         assert_eq!((faults.len(), warnings.len()), (21, 1));
         assert!(faults[20].ends_with("99980 more faults"), "{}", faults[20]);
         assert!(warnings[0].contains("MANY_0 is required but not in extensionsUsed (×100000)"), "{}", warnings[0]);

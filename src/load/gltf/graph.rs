@@ -3,8 +3,8 @@
 use super::codes::Code;
 use super::report::Report;
 use super::schema::{list, position};
+use super::tree::Value;
 use crate::math::{DAffine3, DMat3, DMat4, DQuat, DVec3};
-use serde_json::Value;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -267,9 +267,9 @@ mod tests {
     use serde_json::json;
     use std::path::Path;
 
-    fn graph(nodes: Value) -> (Graph, Vec<String>) {
+    fn graph(nodes: serde_json::Value) -> (Graph, Vec<String>) {
         let mut report = Report::new(Path::new("a.gltf"));
-        let graph = Graph::new(&json!({ "nodes": nodes }), &mut report);
+        let graph = Graph::new(&json!({ "nodes": nodes }).into(), &mut report);
         let mut codes: Vec<String> = report.warnings.clone().into_vec().iter().map(|w| w.code.to_string()).collect();
         if let Err(crate::load::LoadError::Input(faults)) = report.check() {
             codes.extend(faults.iter().map(|f| format!("{} {} ×{}", f.code, f.place, f.count)));
@@ -331,10 +331,10 @@ mod tests {
 
     #[test]
     fn a_very_deep_hierarchy_needs_no_deep_stack() {
-        let nodes: Vec<Value> = (0..100_000)
+        let nodes: Vec<serde_json::Value> = (0..100_000)
             .map(|i| if i == 0 { json!({}) } else { json!({"children": [i - 1], "translation": [1, 0, 0]}) })
             .collect();
-        let (graph, _) = graph(Value::Array(nodes));
+        let (graph, _) = graph(nodes.into());
         assert_eq!(graph.world[0].translation.x, 99_999.0);
     }
 

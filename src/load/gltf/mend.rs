@@ -8,7 +8,7 @@
 use super::codes::Code;
 use super::report::Report;
 use super::schema;
-use serde_json::{Map, Value, json};
+use super::tree::{Map, Value};
 
 /// Properties that are indices, and may be left out.
 const INDICES: [&str; 13] = [
@@ -30,7 +30,7 @@ const INDICES: [&str; 13] = [
 /// Takes out what says that nothing is given.
 pub(super) fn take_out_blanks(root: &mut Value, report: &mut Report) {
     let nodes = root.get_mut("nodes").and_then(Value::as_array_mut).into_iter().flatten();
-    let blank_nodes: u64 = nodes.filter(|node| node.is_null()).map(|node| (*node = json!({}), 1).1).sum();
+    let blank_nodes: u64 = nodes.filter(|node| **node == Value::Null).map(|node| (*node = nothing(), 1).1).sum();
     let blanks = blanks_in(root) + blank_nodes;
     if blanks > 0 {
         let text = "null, or -1 as an index, counts as not given";
@@ -44,7 +44,7 @@ fn blanks_in(value: &mut Value) -> u64 {
     match value {
         Value::Object(map) => {
             let is_blank = |name: &str, value: &Value| {
-                name != "extras" && (value.is_null() || is_none(value) && INDICES.contains(&name))
+                name != "extras" && (*value == Value::Null || is_none(value) && INDICES.contains(&name))
             };
             let blanks = map.iter().filter(|(name, value)| is_blank(name, value)).count() as u64;
             if blanks > 0 {
@@ -77,7 +77,7 @@ pub(super) fn lengthen_buffer(root: &mut Value, chunk: Option<&[u8]>, report: &m
     let end =
         |view: &Value| whole(view, "byteOffset").unwrap_or(0).saturating_add(whole(view, "byteLength").unwrap_or(0));
     let needed = views.map(end).max().unwrap_or(0);
-    let (Some(chunk), Some(buffer)) = (chunk, root.pointer_mut("/buffers/0").and_then(Value::as_object_mut)) else {
+    let (Some(chunk), Some(buffer)) = (chunk, first_buffer(root)) else {
         return;
     };
     let said = buffer.get("byteLength").map_or(Some(0), schema::whole);
@@ -86,8 +86,17 @@ pub(super) fn lengthen_buffer(root: &mut Value, chunk: Option<&[u8]>, report: &m
         let text = format!("{} bytes are declared, its views need {needed}", said.unwrap_or(0));
         let remedy = "what the file has is read";
         report.warn_with(Code::BufferByteLengthMismatch, "buffers[0]", text, remedy);
-        buffer.insert("byteLength".into(), json!(chunk.len()));
+        buffer.insert("byteLength", (chunk.len() as u64).into());
     }
+}
+
+fn first_buffer<'r, 'a>(root: &'r mut Value<'a>) -> Option<&'r mut Map<'a>> {
+    root.get_mut("buffers")?.element_mut(0)?.as_object_mut()
+}
+
+/// An object that says nothing.
+fn nothing() -> Value<'static> {
+    Value::Object(Map::default())
 }
 
 /// Checks the schema, and takes out what breaks it in parts that can be left out.
@@ -122,25 +131,31 @@ fn take_out(root: &mut Value, place: &str) {
     let Some((parent, last)) = place.rsplit_once('.') else {
         // An element of a list at the root.
         let element = step(root, place).into_iter();
-        return element.for_each(|element| *element = Value::Object(Map::new()));
+        return element.for_each(|element| *element = nothing());
     };
     let parent = parent.split('.').try_fold(root, step);
     let (name, is_element) = last.split_once('[').map_or((last, false), |(name, _)| (name, true));
     let Some(map) = parent.and_then(Value::as_object_mut) else { return };
     match step_in(map, last) {
-        // A light must say what it is: one that does not is dark.
-        Some(light) if is_element && name == "lights" => *light = json!({"type": "point", "intensity": 0}),
-        _ => _ = map.remove(name),
+        // One that does not say what it is is dark.
+        Some(light) if is_element && name == "lights" => *light = dark_light(),
+        _ => map.remove(name),
     }
 }
 
+/// A light must say what it is.
+fn dark_light() -> Value<'static> {
+    let members = [("type", Value::String("point".into())), ("intensity", 0.into())];
+    Value::Object(members.into_iter().collect())
+}
+
 /// What a step of a path, `name` or `name[3]`, leads to.
-fn step<'a>(value: &'a mut Value, step: &str) -> Option<&'a mut Value> {
+fn step<'r, 'a>(value: &'r mut Value<'a>, step: &str) -> Option<&'r mut Value<'a>> {
     step_in(value.as_object_mut()?, step)
 }
 
-fn step_in<'a>(map: &'a mut Map<String, Value>, step: &str) -> Option<&'a mut Value> {
+fn step_in<'r, 'a>(map: &'r mut Map<'a>, step: &str) -> Option<&'r mut Value<'a>> {
     let (name, rest) = step.split_once('[').unwrap_or((step, ""));
     let indices = rest.split(['[', ']']).filter(|index| !index.is_empty());
-    indices.map(str::parse::<usize>).try_fold(map.get_mut(name)?, |value, index| value.get_mut(index.ok()?))
+    indices.map(str::parse::<usize>).try_fold(map.get_mut(name)?, |value, index| value.element_mut(index.ok()?))
 }

@@ -54,6 +54,7 @@ mod sparse;
 #[cfg(test)]
 mod tests;
 mod textures;
+mod tree;
 mod usage;
 mod variants;
 mod version;

@@ -1,10 +1,10 @@
 //! What morph targets change that the structs of the document have no place for: colours and texture coordinates.
 
 use super::schema::{list, position};
+use super::tree::{Map, Value};
 use gltf::json::Index;
 use gltf::json::accessor::Accessor;
 use gltf::json::mesh::Semantic;
-use serde_json::Value;
 use std::collections::HashMap;
 
 /// Such changes, by the numbers of mesh and primitive.
@@ -43,7 +43,7 @@ impl Morphs {
 }
 
 fn changes(number: usize, target: &Value) -> impl Iterator<Item = Change> {
-    target.as_object().into_iter().flatten().filter_map(move |(name, accessor)| {
+    target.as_object().into_iter().flat_map(Map::iter).filter_map(move |(name, accessor)| {
         let accessor = Index::new(u32::try_from(position(accessor)?).ok()?);
         Some(Change { target: number, attribute: attribute(name)?, accessor })
     })

@@ -6,8 +6,8 @@
 use super::codes::Code;
 use super::report::Report;
 use super::schema_tables::{EXTENSION_WORDS, EXTENSIONS, ROOT};
+use super::tree::{Tree, Value};
 use crate::load::paths::shorten;
-use serde_json::Value;
 use std::collections::HashSet;
 use std::fmt::Write as _;
 
@@ -94,7 +94,7 @@ pub(super) struct Extension {
 }
 
 /// What the list of this name holds; nothing where there is none.
-pub(super) fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
+pub(super) fn list<'a>(value: &'a Value<'a>, name: &str) -> &'a [Value<'a>] {
     value.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
@@ -124,12 +124,12 @@ fn channels(root: &Value, report: &mut Report) {
     }
 }
 
-fn strings(list: Option<&Value>) -> HashSet<&str> {
+fn strings<'a>(list: Option<&'a Value<'a>>) -> HashSet<&'a str> {
     list.and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str).collect()
 }
 
 struct Walk<'a> {
-    root: &'a Value,
+    root: &'a Value<'a>,
     used: HashSet<&'a str>,
     /// Where the walk is, as a JSON path.
     path: String,
@@ -155,7 +155,7 @@ impl<'a> Walk<'a> {
         self.at(format_args!("{dot}{}", shorten(name)), visit);
     }
 
-    fn object(&mut self, value: &'a Value, rules: &'static Object) {
+    fn object(&mut self, value: &'a Value<'a>, rules: &'static Object) {
         let Some(map) = value.as_object() else { return self.wrong_type(value, "an object") };
         for property in rules.properties {
             match map.get(property.name) {
@@ -171,14 +171,14 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn extensions(&mut self, value: &'a Value, on: &str) {
+    fn extensions(&mut self, value: &'a Value<'a>, on: &str) {
         let Some(map) = value.as_object() else { return self.wrong_type(value, "an object") };
-        for (name, value) in map {
+        for (name, value) in map.iter() {
             self.member(name, |walk| walk.extension(name, value, on));
         }
     }
 
-    fn extension(&mut self, name: &str, value: &'a Value, on: &str) {
+    fn extension(&mut self, name: &str, value: &'a Value<'a>, on: &str) {
         if !value.is_object() {
             return self.wrong_type(value, "an object");
         }
@@ -195,11 +195,11 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn value(&mut self, value: &'a Value, kind: &'static Kind) {
+    fn value(&mut self, value: &'a Value<'a>, kind: &'static Kind) {
         match kind {
             Kind::Any => {}
-            Kind::Bool => self.expect(value.is_boolean(), value, "true or false"),
-            Kind::Text => self.expect(value.is_string(), value, "a text"),
+            Kind::Bool => self.expect(value.as_bool().is_some(), value, "true or false"),
+            Kind::Text => self.expect(value.as_str().is_some(), value, "a text"),
             Kind::Number(range) => self.number(value, *range),
             Kind::Integer { min, max } => self.integer(value, *min, *max),
             Kind::Index(list) => self.index(value, list),
@@ -286,13 +286,16 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn list(&mut self, value: &'a Value, of: &'static Kind, length: std::ops::RangeInclusive<usize>, unique: bool) {
+    fn list(&mut self, value: &'a Value<'a>, of: &'static Kind, length: std::ops::RangeInclusive<usize>, unique: bool) {
         let Some(list) = value.as_array() else { return self.wrong_type(value, "a list") };
         if list.is_empty() && *length.start() > 0 {
             return self.fault(Code::EmptyEntity, "an empty list");
         }
         if !length.contains(&list.len()) {
-            let text = format!("{} elements where {} to {} are allowed", list.len(), length.start(), length.end());
+            let (least, most) = (length.start(), length.end());
+            let right =
+                if least == most { format!("{least} should be") } else { format!("{least} to {most} are allowed") };
+            let text = format!("{} elements where {right}", list.len());
             self.fault(Code::ArrayLengthNotInList, text);
         }
         let mut seen = HashSet::new();
@@ -306,12 +309,12 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn map(&mut self, value: &'a Value, kind: &'static Kind) {
+    fn map(&mut self, value: &'a Value<'a>, kind: &'static Kind) {
         let Some(map) = value.as_object() else { return self.wrong_type(value, "an object") };
         if map.is_empty() {
             self.fault(Code::EmptyEntity, "an empty object");
         }
-        for (name, value) in map {
+        for (name, value) in map.iter() {
             self.member(name, |walk| walk.value(value, kind));
         }
     }
@@ -323,7 +326,7 @@ fn key(value: &Value) -> String {
 }
 
 /// A whole number, however it is written (`1`, `1.0`, `10e-1`).
-pub(super) fn whole(value: &Value) -> Option<u64> {
+pub(super) fn whole(value: &impl Tree) -> Option<u64> {
     /// Above 2⁵³ a double does not say which whole number is meant.
     const LARGEST: f64 = 9_007_199_254_740_992.0;
     let exact = |f: f64| (f.fract() == 0.0 && (0.0..=LARGEST).contains(&f)).then_some(f as u64);
@@ -331,7 +334,7 @@ pub(super) fn whole(value: &Value) -> Option<u64> {
 }
 
 /// A place in a list of the document.
-pub(super) fn position(value: &Value) -> Option<usize> {
+pub(super) fn position(value: &impl Tree) -> Option<usize> {
     usize::try_from(whole(value)?).ok()
 }
 

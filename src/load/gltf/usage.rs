@@ -3,7 +3,7 @@
 use super::codes::Code;
 use super::report::Report;
 use super::schema::{list, position};
-use serde_json::Value;
+use super::tree::{Map, Value};
 
 /// What data is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +63,7 @@ pub(super) fn check(root: &Value, report: &mut Report) {
 }
 
 struct Check<'a> {
-    root: &'a Value,
+    root: &'a Value<'a>,
     /// What each was used for first.
     accessors: Vec<Option<Use>>,
     views: Vec<Option<Use>>,
@@ -71,15 +71,15 @@ struct Check<'a> {
 }
 
 impl<'a> Check<'a> {
-    fn primitive(&mut self, primitive: &'a Value, place: &str) {
+    fn primitive(&mut self, primitive: &'a Value<'a>, place: &str) {
         let attributes = primitive.get("attributes").and_then(Value::as_object);
-        for (name, index) in attributes.into_iter().flatten() {
+        for (name, index) in attributes.into_iter().flat_map(Map::iter) {
             let at = || format!("{place}.attributes.{}", crate::load::paths::shorten(name));
             self.accessor(Some(index), Use::Vertices, at);
         }
         self.accessor(primitive.get("indices"), Use::Indices, || format!("{place}.indices"));
         for (k, target) in list(primitive, "targets").iter().enumerate() {
-            for (name, index) in target.as_object().into_iter().flatten() {
+            for (name, index) in target.as_object().into_iter().flat_map(Map::iter) {
                 let at = || format!("{place}.targets[{k}].{}", crate::load::paths::shorten(name));
                 self.accessor(Some(index), Use::Vertices, at);
             }
@@ -118,16 +118,16 @@ mod tests {
     use std::path::Path;
 
     /// What is told of a file with three accessors, of which 1 and 2 share a view.
-    fn told(parts: Value) -> Vec<String> {
+    fn told(parts: serde_json::Value) -> Vec<String> {
         let mut root = json!({
             "accessors": [{"bufferView": 0}, {"bufferView": 1}, {"bufferView": 1}], "bufferViews": [{}, {}, {}]});
         parts.as_object().unwrap().iter().for_each(|(name, part)| root[name] = part.clone());
         let mut report = Report::new(Path::new("a.gltf"));
-        check(&root, &mut report);
+        check(&root.into(), &mut report);
         report.warnings.into_vec().iter().map(|w| format!("{} {} {}", w.code, w.place, w.text)).collect()
     }
 
-    fn mesh(attribute: u32, indices: u32) -> Value {
+    fn mesh(attribute: u32, indices: u32) -> serde_json::Value {
         json!([{"primitives": [{"attributes": {"POSITION": attribute}, "indices": indices}]}])
     }
 

@@ -5,9 +5,9 @@
 use super::codes::Code;
 use super::report::Report;
 use super::schema::position;
+use super::tree::{Tree, Value};
 use gltf::json::Root;
 use gltf::json::mesh::Primitive;
-use serde_json::Value;
 
 const NAME: &str = "KHR_materials_variants";
 
@@ -31,7 +31,7 @@ pub(super) fn material_in(primitive: &Value, variant: Option<usize>) -> Option<u
     mapped.map(|(_, material)| material).or_else(|| primitive.get("material").and_then(position))
 }
 
-fn extension(primitive: &Primitive) -> Option<&Value> {
+fn extension(primitive: &Primitive) -> Option<&serde_json::Value> {
     primitive.extensions.as_ref()?.others.get(NAME)
 }
 
@@ -50,8 +50,8 @@ pub(super) fn check(root: &Root, variant: usize, report: &mut Report) {
 }
 
 /// The mappings of a primitive that speak of a variant: where each stands, and its material.
-fn mapped(extension: Option<&Value>, variant: usize) -> impl Iterator<Item = (usize, usize)> {
-    let mappings = extension.and_then(|e| e.get("mappings")).and_then(Value::as_array).into_iter().flatten();
+fn mapped<T: Tree>(extension: Option<&T>, variant: usize) -> impl Iterator<Item = (usize, usize)> {
+    let mappings = extension.and_then(|e| e.get("mappings")).and_then(T::as_array).into_iter().flatten();
     mappings.enumerate().filter_map(move |(i, mapping)| {
         let variants = mapping.get("variants")?.as_array()?;
         let speaks = variants.iter().any(|v| position(v) == Some(variant));

@@ -2,7 +2,7 @@
 
 use super::codes::Code;
 use super::report::Report;
-use serde_json::Value;
+use super::tree::Value;
 
 /// Checks `asset.version` and `asset.minVersion`; false when the rest need not be looked at.
 pub(super) fn check(root: &Value, report: &mut Report) -> bool {

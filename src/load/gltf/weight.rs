@@ -3,8 +3,9 @@
 //! A value of JSON may be one digit and a comma in the file, and takes a hundred bytes as a parsed value; a node or a
 //! material takes up to a thousand as a typed struct, even an empty one.
 
+use super::tree::Value;
 use gltf::json::{self, accessor, buffer, mesh, scene, texture};
-use serde_json::Value;
+use std::borrow::Cow;
 
 /// Deepest nesting that the parser reads.
 pub(super) const DEEPEST: usize = 127;
@@ -18,7 +19,7 @@ pub(super) struct Weight {
     values: u64,
     /// Values with a name.
     members: u64,
-    /// Bytes in strings.
+    /// Bytes in strings: those with escapes are copied.
     text: u64,
     /// Containers within containers.
     pub(super) depth: usize,
@@ -55,11 +56,10 @@ impl Weight {
 
     /// Bytes that the parsed values take at most.
     ///
-    /// Lists grow by doubling and start with four places; a member of an object has a name, a hash and a place in a
-    /// table beside its value.
+    /// Lists grow by doubling and start with four places, and so do objects, whose members have names beside their values.
     pub(super) fn bytes(&self) -> u64 {
         const VALUE: u64 = size_of::<Value>() as u64;
-        const NAME: u64 = (size_of::<String>() + 4 * size_of::<usize>()) as u64;
+        const NAME: u64 = size_of::<Cow<str>>() as u64;
         let parts = [
             (2 * self.values + 4 * self.lists, VALUE),
             (2 * self.members, NAME),
@@ -108,10 +108,9 @@ mod tests {
         match value {
             Value::Array(list) => list.capacity() * size_of::<Value>() + list.iter().map(held).sum::<usize>(),
             Value::Object(map) => {
-                let member = |(name, value): (&String, &Value)| size_of::<Value>() + 40 + name.len() + held(value);
-                map.iter().map(member).sum()
+                map.iter().map(|(_, value)| size_of::<Value>() + size_of::<Cow<str>>() + held(value)).sum()
             }
-            Value::String(text) => text.capacity(),
+            Value::String(Cow::Owned(text)) => text.capacity(),
             _ => 0,
         }
     }
@@ -121,7 +120,7 @@ mod tests {
         let many = |one: &str| format!("[{}]", vec![one; 1000].join(","));
         let names: Vec<String> = (0..1000).map(|i| format!("\"{i}\":0")).collect();
         let texts = ["0", "[]", "{}", "[0]", "{\"\":0}", "[[[0]]]", "\"\"", "\"\\\"\\\\\"", "[0,0,0,0,0]"].map(many);
-        let more = [format!("{{{}}}", names.join(",")), format!("\"{}\"", "a".repeat(5000)), "1".into()];
+        let more = [format!("{{{}}}", names.join(",")), format!("\"\\n{}\"", "a".repeat(5000)), "1".into()];
         for text in texts.into_iter().chain(more) {
             let value: Value = serde_json::from_str(&text).unwrap();
             let (charged, held) = (Weight::of(text.as_bytes()).bytes(), held(&value) + size_of::<Value>());

@@ -15,11 +15,11 @@ pub(super) use posed::Originals;
 use super::accessor::{Format, Pick, Reader};
 use super::schema::{list, position};
 use crate::load::AnimationFacts;
+use crate::load::gltf::tree::Value;
 use curve::Interpolation;
 use gltf::json::Index;
 use gltf::json::accessor::{Accessor, ComponentType};
 use pointer::{Entry, Form, Pointed};
-use serde_json::Value;
 use std::collections::HashMap;
 
 /// An animation of the file, as its JSON says.
@@ -226,7 +226,7 @@ fn is_pointer(target: &Value) -> bool {
 fn target(root: &Value, target: &Value) -> Option<(Target, Numbers)> {
     if is_pointer(target) {
         // The schema check has told of a word that the file does not declare.
-        if !list(root, "extensionsUsed").iter().any(|name| name == POINTER) {
+        if !list(root, "extensionsUsed").iter().any(|name| name.as_str() == Some(POINTER)) {
             return Some((Target::Nothing, Numbers::All));
         }
         let pointer = target.get("extensions").and_then(|extensions| extensions.get(POINTER)?.get("pointer")?.as_str());

@@ -7,8 +7,8 @@
 use super::{Numbers, Property, Target};
 use crate::load::gltf::schema::{Kind, Object, Range};
 use crate::load::gltf::schema_tables::{EXTENSIONS, ROOT};
+use crate::load::gltf::tree::Value;
 use crate::load::paths::shorten;
-use serde_json::Value;
 
 /// A part of the document that numbers can be changed in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -180,7 +180,7 @@ fn leaf(root: &Value, steps: &[String]) -> Leaf {
             }
             Some(Kind::List { of: of @ Kind::Object(_), .. }) => {
                 kind = Some(of);
-                value = index(step).and_then(|i| here.get(i));
+                value = index(step).and_then(|i| here.element(i));
             }
             Some(_) => return Leaf::Unknown,
         }

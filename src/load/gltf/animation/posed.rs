@@ -2,6 +2,7 @@
 
 use super::pointer::Entry;
 use super::{Animation, Pose, Target};
+use crate::load::gltf::tree;
 use gltf::json::Root;
 use serde::Deserialize;
 use serde_json::Value;
@@ -13,7 +14,7 @@ pub(in crate::load::gltf) struct Originals(HashMap<Entry, Value>);
 
 impl Originals {
     /// Copies what animations change of JSON that the typed document can be made of.
-    pub(in crate::load::gltf) fn of(root: &Value, animations: &[Animation]) -> Self {
+    pub(in crate::load::gltf) fn of(root: &tree::Value, animations: &[Animation]) -> Self {
         let mut originals = HashMap::new();
         for channel in animations.iter().flat_map(|animation| &animation.channels).flatten() {
             // Weights are changed in the typed document: meshes may be large.
@@ -21,7 +22,7 @@ impl Originals {
                 && pointed.weights().is_none()
                 && let Some(part) = root.pointer(&pointed.entry.pointer())
             {
-                originals.entry(pointed.entry).or_insert_with(|| part.clone());
+                originals.entry(pointed.entry).or_insert_with(|| part.owned());
             }
         }
         Self(originals)
