@@ -328,8 +328,10 @@ pub(super) fn repeat(picture: &Path, typed: &RenderArgs) -> Result<Repeat, (Box<
 
 fn repeat_from(metadata: Option<Metadata>, picture: &Path, typed: &RenderArgs) -> Result<Repeat, Diagnostic> {
     let fault = |text: String| Diagnostic::new("again", picture, "", text);
-    let metadata = metadata.ok_or_else(|| fault("was not written by meshray".into()))?;
-    let entry = |key| metadata.get(key).ok_or_else(|| fault(format!("carries no {key}; it cannot be repeated")));
+    let another = |fault: Diagnostic| fault.remedy("name a picture that meshray wrote");
+    let metadata = metadata.ok_or_else(|| another(fault("was not written by meshray".into())))?;
+    let entry =
+        |key| metadata.get(key).ok_or_else(|| another(fault(format!("carries no {key}: it cannot be repeated"))));
     let settings: Map<String, Value> =
         serde_json::from_str(entry(Metadata::SETTINGS)?).map_err(|e| fault(format!("{}: {e}", Metadata::SETTINGS)))?;
     let inputs: Vec<String> =

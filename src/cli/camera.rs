@@ -186,7 +186,7 @@ impl Shown<'_> {
 /// Refuses an eye that looks at itself.
 pub(super) fn check_eye(eye: Option<[f64; 3]>, at: Option<[f64; 3]>) -> Result<(), Wrong> {
     if eye.is_some() && eye == at {
-        return wrong("--eye and --at are one point, so the camera looks nowhere");
+        return wrong("--eye and --at are one point, so the camera looks nowhere; move one");
     }
     Ok(())
 }
@@ -253,7 +253,7 @@ mod tests {
         assert_eq!(pick(Choice::Camera("Front".into()), None).unwrap().1, "camera 'Front'");
         assert!(pick(Choice::Camera("1".into()), None).is_ok());
         let error = pick(Choice::Camera("Frnt".into()), None).unwrap_err().to_string();
-        assert_eq!(error, "a.glb: there is no camera 'Frnt'; did you mean 'Front'? it has 0 'Front', 1");
+        assert_eq!(error, "a.glb: there is no camera 'Frnt'; did you mean 'Front'? it has 0 'Front', number 1");
         assert!(pick(Choice::Camera(String::new()), None).is_err(), "one without a name has a number");
     }
 

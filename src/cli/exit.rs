@@ -1,6 +1,6 @@
 //! Exit codes. They tell a script whether trying again can help.
 
-use crate::load::diagnostic::OVER_MEMORY;
+use crate::load::diagnostic::{OVER_MEMORY, RAISE_MEMORY};
 use crate::load::{Diagnostic, LoadError};
 use std::process::ExitCode;
 
@@ -42,9 +42,9 @@ impl From<Exit> for ExitCode {
 /// A model that cannot be loaded: trying again helps with more memory where that was all that was missing.
 impl From<&LoadError> for Exit {
     fn from(error: &LoadError) -> Self {
-        // A file that is too large whatever the memory has no remedy.
+        // Other files are too large whatever the memory.
         let of_memory = |fault: &Diagnostic| match fault.code {
-            "file-too-large" => !fault.remedy.is_empty(),
+            "file-too-large" => fault.remedy == RAISE_MEMORY,
             code => code == OVER_MEMORY,
         };
         match error {

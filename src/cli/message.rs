@@ -5,6 +5,7 @@
 
 use super::exit::Exit;
 use super::job::Wrong;
+use crate::load::suggest::nearest;
 use crate::load::{Diagnostic, LoadError};
 use indicatif::MultiProgress;
 use std::ffi::OsString;
@@ -194,7 +195,9 @@ impl Messages {
         match error {
             LoadError::Read { what, source } => {
                 let text = if what.text.is_empty() { source.to_string() } else { format!("{}: {source}", what.text) };
-                self.say(Severity::Error, &Diagnostic { text, ..(**what).clone() });
+                let remedy =
+                    if source.kind() == io::ErrorKind::NotFound { other_name(&what.file) } else { String::new() };
+                self.say(Severity::Error, &Diagnostic { text, remedy, ..(**what).clone() });
             }
             LoadError::Input(faults) => faults.iter().for_each(|fault| self.say(Severity::Error, fault)),
         }
@@ -204,6 +207,20 @@ impl Messages {
     /// Warnings so far, each counted as often as it was met.
     pub(super) fn warnings(&self) -> u32 {
         self.warnings.load(Ordering::Relaxed)
+    }
+}
+
+/// What helps against a file that is not there: what else its folder has that is called almost so.
+fn other_name(file: &Path) -> String {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return format!("the folder '{}' is not there", folder.display());
+    };
+    let names: Vec<String> = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    let typed = file.file_name().unwrap_or_default().to_string_lossy();
+    match nearest(&typed, names.iter().map(String::as_str)) {
+        Some(near) => format!("did you mean '{near}'?"),
+        None => "check its name".into(),
     }
 }
 
@@ -230,6 +247,15 @@ mod tests {
 
     fn fault() -> Diagnostic {
         Diagnostic::new("obj-index", "a \"b\"\n.obj", "118", "index 91, but only 88 exist").remedy("export it again")
+    }
+
+    #[test]
+    fn a_file_that_is_not_there_may_be_another_in_its_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("Duck.glb"), []).unwrap();
+        assert_eq!(other_name(&folder.path().join("duk.glb")), "did you mean 'Duck.glb'?");
+        assert_eq!(other_name(&folder.path().join("helmet.obj")), "check its name");
+        assert!(other_name(&folder.path().join("no/Duck.glb")).contains("is not there"));
     }
 
     #[test]

@@ -166,7 +166,7 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
         format!("{}{parts}", input.display())
     };
     if shots[a].0 == shots[b].0 && what(a) == what(b) {
-        return wrong(format!("{} is asked for twice", what(a)));
+        return wrong(format!("{} is asked for twice; name it once", what(a)));
     }
     // Most often one model in two types of file.
     let types = [a, b].map(|i| shots[i].0.extension());

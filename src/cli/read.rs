@@ -114,6 +114,7 @@ pub(super) fn as_drawn(loaded: &Loaded, how: Instancing, limit: u64, file: &Path
 pub(super) fn not_strict(count: usize, file: &Path) -> Diagnostic {
     let kinds = if count == 1 { "is a warning".into() } else { format!("are {count} kinds of warnings") };
     Diagnostic::new("strict", file, "", format!("not rendered: --strict, and there {kinds}"))
+        .remedy("mend what they tell of, or leave out --strict")
 }
 
 /// Gives a frame that was loaded without pictures those of an earlier one, which are the same, with the materials that

@@ -98,7 +98,8 @@ fn instead(kind: &Kind, names: &[&str], wish: &str) -> String {
     if names.is_empty() {
         return kind.empty.into();
     }
-    let shown = |(i, name): (usize, &&str)| if name.is_empty() { i.to_string() } else { format!("{i} '{name}'") };
+    let shown =
+        |(i, name): (usize, &&str)| if name.is_empty() { format!("number {i}") } else { format!("{i} '{name}'") };
     let list: Vec<String> = names.iter().enumerate().take(LISTED).map(shown).collect();
     let near = nearest(wish, names.iter().copied().filter(|name| !name.is_empty()));
     let near = near.map_or(String::new(), |near| format!("did you mean '{near}'? "));
@@ -119,5 +120,11 @@ mod tests {
         let error = check("Run").unwrap_err().to_string();
         assert_eq!(error, "b.glb:animations: 2 animations are called 'Run'; name one by its number: 3, 5");
         assert!(check("Stay").is_ok() && check("Fly").is_ok());
+    }
+
+    #[test]
+    fn what_has_no_name_is_listed_by_its_number() {
+        let error = choose(&ANIMATION, &["", "Run"], "5", Path::new("b.glb")).unwrap_err().to_string();
+        assert_eq!(error, "b.glb:animations: there is no animation '5'; it has number 0, 1 'Run'");
     }
 }

@@ -41,8 +41,11 @@ const FOREIGN: &[(&[u8], &str)] = &[
     (b"%PDF", "a PDF document"),
     (b"\x7fELF", "a program"),
     (b"b3dm", "a 3D Tiles file"),
-    (b"version https://git-lfs", "a Git LFS pointer, not the file itself"),
+    (b"version https://git-lfs", LFS_POINTER),
 ];
+
+const LFS_POINTER: &str = "a Git LFS pointer, not the file itself";
+const EMPTY: &str = "empty";
 
 /// How a zip archive begins.
 const ZIP: &[u8] = b"PK\x03\x04";
@@ -101,7 +104,12 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
         "nff" => return Ok(Format::Nff),
         "obj" => return Ok(Format::Obj),
         "ply" => return Ok(Format::Ply),
-        "stl" => return Ok(Format::Stl(damaged_stl(text))),
+        "stl" => {
+            return match damaged_stl(text) {
+                Encoding::Binary if is_plain(text) => Err(foreign(source, "a text that is no STL")),
+                encoding => Ok(Format::Stl(encoding)),
+            };
+        }
         "toml" => return Ok(Format::SceneFile),
         _ => {}
     }
@@ -111,7 +119,7 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
     if let Some((_, kind)) = FOREIGN_EXTENSIONS.iter().find(|(e, _)| *e == extension) {
         return Err(foreign(source, kind));
     }
-    by_lines(text).ok_or_else(|| foreign(source, if bytes.is_empty() { "empty" } else { "of an unknown kind" }))
+    by_lines(text).ok_or_else(|| foreign(source, if bytes.is_empty() { EMPTY } else { "of an unknown kind" }))
 }
 
 /// What a file is that should hold lines of words and numbers; `None` where it may be that.
@@ -136,10 +144,11 @@ pub fn is_called_a_model(path: &Path) -> bool {
 }
 
 fn foreign(source: &Source, kind: &str) -> Diagnostic {
-    let remedy = if kind.ends_with("archive") {
-        "unpack it first"
-    } else {
-        "meshray reads .glb, .gltf, .vrm, .obj, .ply, .stl, .nff and .toml scenes"
+    let remedy = match kind {
+        EMPTY => "get it again",
+        LFS_POINTER => "fetch it with `git lfs pull`",
+        archive if archive.ends_with("archive") => "unpack it first",
+        _ => "meshray reads .glb, .gltf, .vrm, .obj, .ply, .stl, .nff and .toml scenes",
     };
     Diagnostic::new("unsupported-format", &source.path, "", format!("this is {kind}")).remedy(remedy)
 }
@@ -162,6 +171,13 @@ fn damaged_stl(text: &[u8]) -> Encoding {
     // Remarks may stand before it.
     let is_text = (begins || has(&start.to_ascii_lowercase(), b"facet normal")) && !start.contains(&0);
     if is_text { Encoding::Text } else { Encoding::Binary }
+}
+
+/// Whether the start of a file, longer than the header of a binary STL, is text.
+fn is_plain(text: &[u8]) -> bool {
+    let start = &text[..text.len().min(512)];
+    start.len() > 84
+        && std::str::from_utf8(start).is_ok_and(|start| !start.contains(|c: char| c.is_control() && !c.is_whitespace()))
 }
 
 fn has(bytes: &[u8], part: &[u8]) -> bool {
@@ -196,6 +212,27 @@ mod tests {
 
     fn of(name: &str, bytes: &[u8]) -> Result<Format, String> {
         detect(&Source { path: name.into(), bytes: bytes.to_vec() }).map_err(|d| d.to_string())
+    }
+
+    #[test]
+    fn what_is_no_model_says_what_helps() {
+        for (name, bytes, remedy) in [
+            ("a.dat", &b""[..], "; get it again"),
+            ("a.glb", b"version https://git-lfs.github.com/spec/v1\n", "; fetch it with `git lfs pull`"),
+            ("a.glb", ZIP, "; unpack it first"),
+            ("a.xyz", b"1 2 3\n", "and .toml scenes"),
+        ] {
+            let said = of(name, bytes).unwrap_err();
+            assert!(said.ends_with(remedy), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_text_that_is_called_stl_is_no_binary_one() {
+        let users = "root:x:0:0:root:/root:/bin/sh\n".repeat(20);
+        assert!(of("a.stl", users.as_bytes()).unwrap_err().starts_with("a.stl: this is a text that is no STL"));
+        // Cut off inside its header, a binary one may be text so far.
+        assert_eq!(of("a.stl", &users.as_bytes()[..80]), Ok(Format::Stl(Encoding::Binary)));
     }
 
     #[test]

@@ -9,7 +9,13 @@ use std::path::{Path, PathBuf};
 pub(crate) const OVER_MEMORY: &str = "over-memory";
 
 /// What helps against that.
-pub(super) const RAISE_MEMORY: &str = "raise --max-memory";
+pub(crate) const RAISE_MEMORY: &str = "raise --max-memory";
+
+/// What helps against a file that ends too early.
+pub(super) const CUT_OFF: &str = "it was cut off; get it again";
+
+/// What helps against a file that says what cannot be.
+pub(super) const DAMAGED: &str = "it is damaged; export it again";
 
 /// One thing worth telling the user.
 ///
@@ -70,7 +76,8 @@ impl fmt::Display for Diagnostic {
             }
             f.write_str(" ")?;
         }
-        f.write_str(&clean(&self.text))?;
+        // Texts of libraries may end in an empty line.
+        f.write_str(&clean(self.text.trim_end()))?;
         if self.count > 1 {
             write!(f, " (×{})", self.count)?;
         }
@@ -92,7 +99,8 @@ pub enum LoadError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// The input is broken, unsupported, empty or too large: a retry is useless (exit code 3).
+    /// The input is broken, unsupported, empty or too large: a retry is useless (exit code 3), but for one that needs more
+    /// memory than it may take (exit code 1).
     #[error("{}", join(.0))]
     Input(
         /// Every fault found, at least one.

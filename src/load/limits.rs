@@ -22,7 +22,7 @@ impl Default for Limits {
 impl Limits {
     /// What lets a larger file in: more memory, unless a file may not be larger whatever the memory.
     pub(super) fn remedy_for_file(&self) -> &'static str {
-        if self.file == self.memory { RAISE_MEMORY } else { "" }
+        if self.file == self.memory { RAISE_MEMORY } else { "split it" }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Pictures of surroundings: Radiance HDR, OpenEXR, and 8- or 16-bit pictures, whose colours are sRGB and which cameras turn.
 
+use super::diagnostic::CUT_OFF;
 use super::limits::{Budget, Limits};
 use super::texture::{cut_off, format_of, within};
 use super::{Diagnostic, LoadError, Source};
@@ -16,7 +17,7 @@ use ::image::codecs::hdr::HdrDecoder;
 use ::image::error::DecodingError;
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Rgb, Rgb32FImage};
 use std::borrow::Cow;
-use std::io::Cursor;
+use std::io::{Cursor, ErrorKind};
 use std::path::Path;
 use std::sync::Arc;
 use xxhash_rust::xxh3::xxh3_128;
@@ -66,11 +67,19 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
     let luminance = meta.as_ref().and_then(of_luminance);
     let size = luminance.map_or_else(|| reader(limits.memory).into_dimensions(), |part| Ok(size_of(part)));
     let size = size.map_err(|e| fault(format!("cannot be decoded: {e}")))?;
+    // An EXR file is decoded as large as it says that its data are, whatever part of them is shown.
+    for part in meta.iter().flat_map(|meta| &meta.headers) {
+        memory_of(size_of(part), limits, &source.path, fault)?;
+    }
     let most = memory_of(size, limits, &source.path, fault)?;
     let decode = || if luminance.is_some() { grey(bytes) } else { upright(reader(most)) };
     // The decoder of EXR files gives up on some damaged ones by a panic.
     let picture = match attempt(|| threads::anywhere(decode)) {
         Some(Ok(picture)) => picture,
+        Some(Err(ImageError::IoError(why))) if why.kind() == ErrorKind::UnexpectedEof => {
+            let fault = Diagnostic::new("env-unusable", &source.path, "", format!("cannot be decoded: {why}"));
+            return Err(fault.remedy(CUT_OFF).into());
+        }
         Some(Err(e)) => return Err(fault(format!("cannot be decoded: {e}"))),
         None => return Err(fault("cannot be decoded: it is damaged".into())),
     };
@@ -111,7 +120,12 @@ fn memory_of(
         let text = format!("is {width}×{height} pixels where 1 to {} are allowed", limits.image_pixels);
         // Less memory allows less pixels.
         let fits = (1..=Limits::default().image_pixels).contains(&pixels);
-        return Err(if fits { Diagnostic::over_memory(path, "", text).into() } else { fault(text) });
+        let too_large = |text| Diagnostic::new("env-unusable", path, "", text).remedy("scale it down").into();
+        return Err(match pixels {
+            0 => fault(text),
+            _ if fits => Diagnostic::over_memory(path, "", text).into(),
+            _ => too_large(text),
+        });
     }
     Budget::new(limits)
         .take(pixels, PER_PIXEL)
@@ -404,6 +418,18 @@ mod tests {
         refused(&whole.bytes[..whole.bytes.len() / 2], &usual);
         refused(&whole.bytes, &Limits { image_pixels: 2047, ..usual });
         refused(&whole.bytes, &Limits { memory: 64 * 32 * 12, ..usual });
+    }
+
+    #[test]
+    fn an_exr_is_as_large_as_its_data_whatever_part_of_them_it_shows() {
+        let mut source = exr([[0.64, 0.33], [0.3, 0.6], [0.15, 0.06]], [1.0; 3], 1);
+        // The last column of the data window: a name, a type and a size come before two times two whole numbers.
+        let name = b"dataWindow\0box2i\0";
+        let at = source.bytes.windows(name.len()).position(|bytes| bytes == name).unwrap() + name.len() + 4 + 8;
+        assert_eq!(source.bytes[at..at + 4], 3i32.to_le_bytes());
+        source.bytes[at..at + 4].copy_from_slice(&600_000_000i32.to_le_bytes());
+        let error = decode(&source, &Limits::default()).unwrap_err().to_string();
+        assert_eq!(error, "sky.exr: is 600000001×2 pixels where 1 to 268435456 are allowed; scale it down");
     }
 
     #[test]

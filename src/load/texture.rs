@@ -4,7 +4,7 @@
 //! little. Colour profiles, gamma chunks and EXIF orientation are ignored, as glTF demands. A picture that is missing or
 //! broken costs a warning, and the material goes on without that map; a JPEG that was cut off is told of, and used.
 
-use super::diagnostic::RAISE_MEMORY;
+use super::diagnostic::{CUT_OFF, RAISE_MEMORY};
 use super::limits::{Budget, Limits};
 use super::{Diagnostic, Warnings, jpeg, ktx};
 use crate::pages::Paged;
@@ -14,7 +14,7 @@ use ::image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, Im
 use bytemuck::Pod;
 use rayon::prelude::*;
 use std::cmp::Reverse;
-use std::io::Cursor;
+use std::io::{Cursor, ErrorKind};
 use std::path::Path;
 use std::time::Instant;
 
@@ -76,7 +76,7 @@ pub(super) fn cut_off(name: &str, bytes: &[u8], file: &Path, place: &str) -> Opt
     }
     let (name, len) = (super::paths::shorten(name), bytes.len());
     let text = format!("image '{name}' is cut off: its {len} bytes have no end, and what is missing is grey or coarse");
-    Some(Diagnostic::new("image-cut-off", file, place, text).remedy("copy, download or export the picture again"))
+    Some(Diagnostic::new("image-cut-off", file, place, text).remedy("get it again"))
 }
 
 /// Why a picture cannot be used, and what helps.
@@ -113,6 +113,9 @@ impl From<ImageError> for Unusable {
     fn from(error: ImageError) -> Self {
         match error {
             ImageError::Limits(_) => Self::too_large("it needs more memory than is left"),
+            ImageError::IoError(why) if why.kind() == ErrorKind::UnexpectedEof => {
+                Self { why: why.to_string(), remedy: CUT_OFF }
+            }
             other => Self::new(other.to_string()),
         }
     }

@@ -354,7 +354,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             false => path,
         };
         match passed {
-            Passed::Back => self.continuing[class as usize].push_behind(*ray, lessened(path), *hit),
+            Passed::Back => self.continuing[class as usize].push_behind(*ray, lessened(path).behind_back(), *hit),
             Passed::Covered(covered) if covered <= 0.0 => {
                 self.continuing[class as usize].push(*ray, traced.path_through(at), *hit);
             }

@@ -82,22 +82,37 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
 
 /// What facets of a lobe mirror of light from a direction: a share, 1/sr.
 fn mirrored<G: Ground>(point: &Point<G>, crossing: &Crossing, lobe: &Lobe, dir: Vec3) -> Vec3 {
-    let Seen { view, .. } = point.surface.seen();
-    let Some((facet, density)) = lobe.facet_to(view, dir) else { return Vec3::ZERO };
-    point.matter.balance(view.dot(facet), crossing).mirrored(lobe.sent(view, dir)) * density
+    let Seen { normal, view, .. } = point.surface.seen();
+    from_both_sides(normal, dir, |dir| {
+        let Some((facet, density)) = lobe.facet_to(view, dir) else { return Vec3::ZERO };
+        point.matter.balance(view.dot(facet), crossing).mirrored(lobe.sent(view, dir)) * density
+    })
 }
 
 /// What they let through.
 fn let_through<G: Ground>(point: &Point<G>, crossing: &Crossing, lobe: &Lobe, dir: Vec3) -> Vec3 {
     let Seen { normal, view, .. } = point.surface.seen();
-    let facet = if crossing.n_i == crossing.n_t {
-        // Thin: as a mirror does, on the other side.
-        lobe.facet_to(view, dir - normal * (2.0 * normal.dot(dir)))
-    } else {
-        lobe.facet_through(view, dir, (crossing.n_i, crossing.n_t))
-    };
-    let Some((facet, density)) = facet else { return Vec3::ZERO };
-    point.matter.balance(view.dot(facet), crossing).refracted * density
+    from_both_sides(normal, dir, |dir| {
+        let facet = if crossing.n_i == crossing.n_t {
+            // Thin: as a mirror does, on the other side.
+            lobe.facet_to(view, over(normal, dir))
+        } else {
+            lobe.facet_through(view, dir, (crossing.n_i, crossing.n_t))
+        };
+        let Some((facet, density)) = facet else { return Vec3::ZERO };
+        point.matter.balance(view.dot(facet), crossing).refracted * density
+    })
+}
+
+/// What facets turn to a direction, of which there are two kinds: what some would send to the wrong side of the surface is sent to
+/// the right one instead ([`above`]).
+fn from_both_sides(normal: Vec3, dir: Vec3, turned_to: impl Fn(Vec3) -> Vec3) -> Vec3 {
+    turned_to(dir) + turned_to(over(normal, dir))
+}
+
+/// A direction on the other side of a surface.
+fn over(normal: Vec3, dir: Vec3) -> Vec3 {
+    dir - normal * (2.0 * normal.dot(dir))
 }
 
 impl Lobe {

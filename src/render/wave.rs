@@ -75,6 +75,11 @@ impl Path {
         }
     }
 
+    /// The same behind the back of a one-sided face, which no ray sees, but which is in the way of those to glare.
+    pub(crate) fn behind_back(self) -> Self {
+        Self { calm: false, ..self }
+    }
+
     /// The same after a turn that no other ray from this point takes.
     pub(crate) fn turned(self, class: RayClass, number: u32) -> Self {
         Self { branch: mix(self.branch, (number << 2) | class as u32), ..self }

@@ -252,7 +252,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
 
         // Pass what is not there: backs of one-sided faces, absent texels, and part of what is blended.
         if !surface.front && !material.double_sided && !material.reflection.transmits() {
-            return self.continuing[class as usize].push_behind(*ray, *path, *hit);
+            return self.continuing[class as usize].push_behind(*ray, path.behind_back(), *hit);
         }
         let reader = Reader { store: context.textures, patch: surface.patch.as_ref(), known: &[] };
         let base = reader.base(material);

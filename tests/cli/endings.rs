@@ -71,7 +71,8 @@ fn a_batch_goes_on_after_a_bad_file_and_ends_as_badly_as_its_worst() {
 #[test]
 fn points_and_lines_that_stand_nowhere_are_nothing_to_draw() {
     let folder = Folder::new().file("dots.obj", NOTHING_TO_DRAW);
-    let run = folder.render(&["dots.obj"]).ends(3).says(&["all of its 2 faces, lines and points", "--allow-empty"]);
+    let run =
+        folder.render(&["dots.obj"]).ends(3).says(&["all of its 2 faces, lines, points and shapes", "--allow-empty"]);
     assert_eq!(run.errors().len(), 1, "{}", run.stderr);
     assert_eq!(folder.names(), ["dots.obj"]);
 }

@@ -61,7 +61,8 @@ impl Bench<'_> {
             if interrupt::raised() {
                 return Exit::Interrupted;
             }
-            let fault = Diagnostic::new("no-camera", path, "", "the file has no `v`, so there is no picture");
+            let fault = Diagnostic::new("no-camera", path, "", "the file has no `v`, so there is no picture")
+                .remedy("give it a view");
             self.messages.fail(&fault, Exit::Input)
         })
     }

@@ -79,7 +79,7 @@ fn check_outputs(args: &DiffArgs) -> Result<(), Fault> {
     for (flag, path) in outputs {
         let Some(path) = path else { continue };
         if FileKind::from_path(path).ok() != Some(FileKind::Png) {
-            let fault = Diagnostic::new("usage", path, "", format!("{flag} writes a PNG; name it so"));
+            let fault = Diagnostic::new("usage", path, "", format!("{flag} writes a PNG; end its name in .png"));
             return Err(Box::new((fault, Exit::Usage)));
         }
         writable::check(path, flag, &sources).map_err(|fault| Box::new((fault, Exit::Failed)))?;

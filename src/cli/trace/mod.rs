@@ -76,7 +76,7 @@ fn check(args: &TraceArgs) -> Result<Look, Wrong> {
     if let Some(path) = &args.output
         && FileKind::from_path(path).ok() != Some(FileKind::Png)
     {
-        return Err(Wrong("-o writes a PNG; name it so".into()));
+        return Err(Wrong("-o writes a PNG; end its name in .png".into()));
     }
     Ok(Look {
         size: args.size,

@@ -5,6 +5,7 @@ use super::meshopt::{self, Decoded};
 use super::named::{Reader, Unread};
 use super::report::Report;
 use crate::load::Diagnostic;
+use crate::load::diagnostic::DAMAGED;
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::paths::{FileFault, Resolver, shorten};
 use base64::Engine as _;
@@ -203,9 +204,9 @@ impl<'a> Find<'a, '_> {
         match decode_data(uri) {
             Ok(bytes) => Slot::Bytes(Cow::Owned(bytes)),
             Err(why) => {
-                let text = format!("'{}' is no data URI: {why}", shorten(uri));
-                self.report.add(Code::InvalidUri, place, text.clone());
-                Slot::Failed(Diagnostic::new(Code::InvalidUri.name(), self.files.file, place, text))
+                let text = format!("the data URI '{}' cannot be decoded: {}", shorten(uri), why.trim_end_matches('.'));
+                self.report.refuse_with(Code::InvalidUri, place, text.clone(), DAMAGED);
+                Slot::Failed(Diagnostic::new(Code::InvalidUri.name(), self.files.file, place, text).remedy(DAMAGED))
             }
         }
     }
@@ -237,7 +238,9 @@ impl<'a> Find<'a, '_> {
 fn check_length(i: usize, buffer: &buffer::Buffer, bytes: &[u8], report: &mut Report) {
     let declared = buffer.byte_length.0;
     if (bytes.len() as u64) < declared {
-        let text = format!("{declared} bytes are declared, {} are there", bytes.len());
+        let uri = buffer.uri.as_deref().filter(|uri| !is_data(uri));
+        let file = uri.map_or(String::new(), |uri| format!(" in '{}'", shorten(uri)));
+        let text = format!("{declared} bytes are declared, {} are there{file}", bytes.len());
         report.add(Code::BufferByteLengthMismatch, format!("buffers[{i}]"), text);
     }
 }

@@ -8,6 +8,7 @@
 //! drawn from them ([`Code::verdict_at`]). Of materials, textures, samplers and lights, and of names, what breaks the schema
 //! is left out (`mend`).
 
+use crate::load::diagnostic::{CUT_OFF, DAMAGED};
 use std::sync::LazyLock;
 
 /// What becomes of a fault.
@@ -52,7 +53,7 @@ codes! {
     GlbInvalidMagic "GLB_INVALID_MAGIC" Refuse "not a GLB file";
     GlbInvalidVersion "GLB_INVALID_VERSION" Refuse "only container version 2 holds glTF 2.0";
     GlbLengthTooSmall "GLB_LENGTH_TOO_SMALL" Refuse "there is no room for a scene";
-    GlbLengthMismatch "GLB_LENGTH_MISMATCH" Warn "the chunks themselves say whether they are whole";
+    GlbLengthMismatch "GLB_LENGTH_MISMATCH" Warn "what is there is read";
     GlbUnexpectedEndOfHeader "GLB_UNEXPECTED_END_OF_HEADER" Refuse "the file was cut off";
     GlbUnexpectedEndOfChunkHeader "GLB_UNEXPECTED_END_OF_CHUNK_HEADER" Refuse "the file was cut off";
     GlbUnexpectedEndOfChunkData "GLB_UNEXPECTED_END_OF_CHUNK_DATA" Refuse "the JSON was cut off; of binary data what is there is read";
@@ -102,7 +103,7 @@ codes! {
 
     // Buffers, views, accessors.
     BufferDataUriMimeTypeInvalid "BUFFER_DATA_URI_MIME_TYPE_INVALID" Warn "the bytes are read all the same";
-    BufferByteLengthMismatch "BUFFER_BYTE_LENGTH_MISMATCH" Warn "refused only where missing bytes are needed";
+    BufferByteLengthMismatch "BUFFER_BYTE_LENGTH_MISMATCH" Warn "what is there is read";
     BufferGlbChunkTooBig "BUFFER_GLB_CHUNK_TOO_BIG" Accept "padding is not read";
     BufferMissingGlbData "BUFFER_MISSING_GLB_DATA" Refuse "geometry is missing";
     BufferViewInvalidByteStride "BUFFER_VIEW_INVALID_BYTE_STRIDE" Warn "the stride is ignored where it means nothing";
@@ -255,6 +256,26 @@ impl Code {
         &NAMES[self as usize]
     }
 
+    /// What helps where it refuses a file.
+    pub fn remedy(self) -> &'static str {
+        match self {
+            Self::GlbLengthTooSmall
+            | Self::GlbUnexpectedEndOfHeader
+            | Self::GlbUnexpectedEndOfChunkHeader
+            | Self::GlbUnexpectedEndOfChunkData
+            | Self::GlbChunkTooBig
+            | Self::BufferMissingGlbData => CUT_OFF,
+            Self::GlbInvalidVersion | Self::PatternMismatch | Self::UnknownAssetMajorVersion => {
+                "convert it to glTF 2.0 (gltf-pipeline, Blender)"
+            }
+            Self::InvalidUri => "name the file by a relative path, or export it as .glb",
+            Self::NodeLoop => "take it out of the children of what it holds",
+            Self::NodeParentOverride => "take the node out of all lists of children but one",
+            Self::AccessorIndexPrimitiveRestart => "export it without primitive restart",
+            _ => DAMAGED,
+        }
+    }
+
     /// What becomes of it at a place: parts that a picture can do without are never a reason to refuse.
     pub fn verdict_at(self, place: &str) -> Verdict {
         let spared = ["animations", "cameras", "images"].iter().any(|part| place.starts_with(part) && place != *part);
@@ -288,6 +309,13 @@ mod tests {
             assert!(TABLE[..i].iter().all(|other| other.khronos != row.khronos), "{} twice", row.khronos);
         }
         assert_eq!(Code::UnresolvedReference.name(), "gltf-unresolved-reference");
+    }
+
+    #[test]
+    fn whatever_refuses_a_file_says_what_helps() {
+        assert!(Code::GlbUnexpectedEndOfHeader.remedy().starts_with("it was cut off"));
+        assert!(Code::UnknownAssetMajorVersion.remedy().starts_with("convert it"));
+        assert!(Code::UnresolvedReference.remedy().starts_with("it is damaged"));
     }
 
     #[test]

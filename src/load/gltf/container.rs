@@ -2,6 +2,7 @@
 
 use super::codes::Code;
 use super::report::Report;
+use crate::load::text::without_mark;
 use std::cmp::Ordering;
 
 const JSON: u32 = u32::from_le_bytes(*b"JSON");
@@ -38,6 +39,17 @@ fn report_foreign(bytes: &[u8], report: &mut Report) -> bool {
         report.add(Code::GlbUnexpectedEndOfHeader, "", format!("a file of {} bytes holds no scene", bytes.len()));
         return true;
     }
+    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+        report.refuse_with(Code::InvalidJson, "", "the JSON is UTF-16 where UTF-8 should be", "save it as UTF-8");
+        return true;
+    }
+    let text = without_mark(bytes).trim_ascii_start();
+    // A list or a word is JSON at least, and its reader says more.
+    if !text.first().is_some_and(|first| b"{[\"-0123456789tfn".contains(first)) {
+        let text = "it begins neither with `glTF` nor with `{`, so it is no glTF";
+        report.refuse_with(Code::InvalidJson, "", text, "give it the extension of what it is, or export it again");
+        return true;
+    }
     false
 }
 
@@ -53,8 +65,8 @@ fn split_glb<'a>(bytes: &'a [u8], report: &mut Report) -> Option<(&'a [u8], Opti
         return None;
     };
     if version != 2 {
-        let remedy = if version == 1 { ": this is glTF 1.0; convert it to glTF 2.0" } else { "" };
-        report.add(Code::GlbInvalidVersion, "", format!("GLB version {version} where 2 is understood{remedy}"));
+        let kind = if version == 1 { ": this is glTF 1.0" } else { "" };
+        report.add(Code::GlbInvalidVersion, "", format!("GLB version {version} where 2 is understood{kind}"));
         return None;
     }
     let length = length as usize;
@@ -95,13 +107,13 @@ fn chunks<'a>(bytes: &'a [u8], declared: usize, report: &mut Report) -> Option<(
         };
         let length = length as usize;
         if number == 0 && kind != JSON {
-            report.add(Code::GlbUnexpectedFirstChunk, place, format!("its type is {kind:#010x}, not JSON"));
+            report.add(Code::GlbUnexpectedFirstChunk, place, format!("its type is {}, not JSON", name_of(kind)));
             return None;
         }
         let (there, room) = (rest.len() - 8, declared.saturating_sub(at + 8));
         if length > there.min(room) {
             let (code, text) = if length <= room {
-                let text = format!("it should have {length} bytes, only {there} are there; the file was cut off");
+                let text = format!("it should have {length} bytes, only {there} are there");
                 (Code::GlbUnexpectedEndOfChunkData, text)
             } else {
                 let text = format!("it should have {length} bytes, the header leaves room for {room}");
@@ -128,6 +140,15 @@ fn chunks<'a>(bytes: &'a [u8], declared: usize, report: &mut Report) -> Option<(
         }
     }
     json.map(|json| (json, bin))
+}
+
+/// The type of a chunk as the letters that it is made of, or as a number.
+fn name_of(kind: u32) -> String {
+    let bytes = kind.to_le_bytes();
+    match std::str::from_utf8(&bytes).map(|text| text.trim_end_matches(['\0', ' '])) {
+        Ok(name) if !name.is_empty() && name.bytes().all(|b| b.is_ascii_graphic()) => format!("'{name}'"),
+        _ => format!("{kind:#010x}"),
+    }
 }
 
 fn check_chunk(kind: u32, length: usize, number: usize, place: &str, report: &mut Report) {

@@ -10,6 +10,7 @@ use super::report::Report;
 use super::schema;
 use super::tree::{Map, Value};
 use super::weight::{DEEPEST, Weight};
+use crate::load::diagnostic::CUT_OFF;
 use gltf::json::{Camera, Root};
 use serde::Deserialize;
 use serde_json::Number;
@@ -30,7 +31,7 @@ pub(super) struct Document {
 pub(super) fn check_depth(weight: &Weight, report: &mut Report) {
     if weight.depth > DEEPEST {
         let text = format!("the JSON cannot be read: it is nested {} deep where {DEEPEST} are allowed", weight.depth);
-        report.add(Code::InvalidJson, "", text);
+        report.refuse_with(Code::InvalidJson, "", text, "export it with less in each other");
     }
 }
 
@@ -49,8 +50,10 @@ pub(super) fn parse<'a>(text: &'a str, report: &mut Report) -> Option<Value<'a>>
     match serde_json::from_str(text.trim_end_matches('\0')) {
         Ok(value) => Some(value),
         Err(e) => {
-            let place = if e.line() > 1 { e.line().to_string() } else { String::new() };
-            report.add(Code::InvalidJson, place, format!("the JSON cannot be read: {e}"));
+            let (place, why) = (format!("{}:{}", e.line(), e.column()), e.to_string());
+            let why = why.rsplit_once(" at line ").map_or(why.as_str(), |(why, _)| why);
+            let remedy = if e.is_eof() { CUT_OFF } else { Code::InvalidJson.remedy() };
+            report.refuse_with(Code::InvalidJson, place, format!("the JSON cannot be read: {why}"), remedy);
             None
         }
     }

@@ -188,7 +188,7 @@ impl Loading<'_> {
         let played = Played { moving: self.options.moment.is_some(), switches: pose.switches, weights: &pose.weights };
         let placed = scene::walk(reader, graph, facts.scene_index, played, budget, self.report);
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
-        let skins = skin::load(reader, graph, &placed.variants, self.report);
+        let skins = skin::load(reader, graph, &placed.posed, self.report);
         skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
         let palette = Palette::new(root, &document.morphs, &placed, facts.variant, self.options.smooth.is_some());
         for texture in &palette.textures.without_image {
@@ -311,7 +311,7 @@ impl Loading<'_> {
         palette: &Palette,
         budget: &mut Budget,
     ) -> Result<(), LoadError> {
-        let meshes = placed.variants.iter().filter_map(|v| Some((v, reader.root.meshes.get(v.mesh)?)));
+        let meshes = placed.posed.iter().filter_map(|posed| Some((posed, reader.root.meshes.get(posed.mesh)?)));
         let primitives = meshes.flat_map(|(v, mesh)| mesh.primitives.iter().enumerate().map(move |p| (v, mesh, p)));
         let costs = primitives.map(|(v, mesh, (k, p))| mesh::cost(reader, &palette.job(v, mesh, k, p, skins)));
         self.take(budget, costs.fold(0, u64::saturating_add), "what the meshes hold")
@@ -337,7 +337,7 @@ impl Loading<'_> {
         facts: &mut Facts,
     ) -> Result<(Vec<Wires>, Vec<Instance>), LoadError> {
         let mut dropped = faces::Dropped::default();
-        // For each variant, its meshes and where a skin has put them; likewise its points and lines.
+        // For each posed mesh, its primitives and where a skin has put them; likewise its points and lines.
         let mut parts: Vec<[Vec<Part>; 2]> = Vec::new();
         let mut wires: Vec<Wires> = Vec::new();
         for primitives in reads {
@@ -368,7 +368,7 @@ impl Loading<'_> {
                 mesh,
                 world_from_object: posed.unwrap_or(draw.world),
             };
-            if let Some([meshes, lines]) = parts.get(draw.variant) {
+            if let Some([meshes, lines]) = parts.get(draw.posed) {
                 scene.instances.extend(meshes.iter().map(place));
                 places.extend(lines.iter().map(place));
             }
@@ -392,7 +392,7 @@ impl Loading<'_> {
     }
 }
 
-/// Reads every primitive of every variant, in parallel; the order of results is that of the file.
+/// Reads every primitive of every posed mesh, in parallel; the order of results is that of the file.
 fn read_meshes(
     reader: Reader,
     placed: &Placed,
@@ -401,21 +401,21 @@ fn read_meshes(
     file: &std::path::Path,
 ) -> Vec<Vec<(Option<Read>, Report)>> {
     let root = reader.root;
-    let read_one = |variant: &scene::Variant, k: usize, primitive: &source::Primitive, mesh: &source::Mesh| {
+    let read_one = |posed: &scene::PosedMesh, k: usize, primitive: &source::Primitive, mesh: &source::Mesh| {
         let mut report = Report::new(file);
-        let job = palette.job(variant, mesh, k, primitive, skins);
-        let mut read = mesh::read(reader, &job, &mut report).filter(|_| variant.drawn);
-        if let (Some(read), Some(material)) = (&mut read, palette.material(variant, primitive)) {
+        let job = palette.job(posed, mesh, k, primitive, skins);
+        let mut read = mesh::read(reader, &job, &mut report).filter(|_| posed.drawn);
+        if let (Some(read), Some(material)) = (&mut read, palette.material(posed, primitive)) {
             read.mesh.material = material;
         }
         (read, report)
     };
-    let variants = placed.variants.par_iter();
-    variants
-        .map(|variant| {
-            let Some(mesh) = root.meshes.get(variant.mesh) else { return Vec::new() };
+    let posed = placed.posed.par_iter();
+    posed
+        .map(|posed| {
+            let Some(mesh) = root.meshes.get(posed.mesh) else { return Vec::new() };
             let primitives = mesh.primitives.par_iter().enumerate();
-            primitives.map(|(k, primitive)| read_one(variant, k, primitive, mesh)).collect()
+            primitives.map(|(k, primitive)| read_one(posed, k, primitive, mesh)).collect()
         })
         .collect()
 }

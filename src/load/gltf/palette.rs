@@ -3,7 +3,7 @@
 use super::material;
 use super::mesh::{Job, Needs};
 use super::morphs::Morphs;
-use super::scene::{Placed, Variant};
+use super::scene::{Placed, PosedMesh};
 use super::skin::Skin;
 use super::textures::Textures;
 use super::variants;
@@ -44,7 +44,7 @@ impl<'a> Palette<'a> {
             textures: Textures::new(root),
             morphs,
         };
-        let drawn = placed.variants.iter().filter(|v| v.drawn).filter_map(|v| root.meshes.get(v.mesh));
+        let drawn = placed.posed.iter().filter(|posed| posed.drawn).filter_map(|posed| root.meshes.get(posed.mesh));
         for primitive in drawn.flat_map(|mesh| &mesh.primitives) {
             let i = variants::material(primitive, variant).unwrap_or(default);
             if palette.index.get(i).is_none_or(Option::is_some) {
@@ -62,31 +62,31 @@ impl<'a> Palette<'a> {
     }
 
     /// The material that a primitive shows; `None` when it is not drawn.
-    pub(super) fn material(&self, variant: &Variant, primitive: &source::Primitive) -> Option<u32> {
+    pub(super) fn material(&self, posed: &PosedMesh, primitive: &source::Primitive) -> Option<u32> {
         // The default material is the last.
         let i = variants::material(primitive, self.variant).unwrap_or(self.index.len().checked_sub(1)?);
-        self.index.get(i).copied().flatten().filter(|_| variant.drawn)
+        self.index.get(i).copied().flatten().filter(|_| posed.drawn)
     }
 
     /// What to read of a primitive, the `k`th of its mesh.
     pub(super) fn job<'j>(
         &'j self,
-        variant: &'j Variant,
+        posed: &'j PosedMesh,
         mesh: &'j source::Mesh,
         k: usize,
         primitive: &'j source::Primitive,
         skins: &'j [Option<Skin>],
     ) -> Job<'j> {
-        let needs = self.material(variant, primitive).and_then(|material| self.needs.get(material as usize));
+        let needs = self.material(posed, primitive).and_then(|material| self.needs.get(material as usize));
         Job {
             primitive,
-            place: format!("meshes[{}].primitives[{k}]", variant.mesh),
+            place: format!("meshes[{}].primitives[{k}]", posed.mesh),
             name: mesh.name.as_deref().unwrap_or_default(),
-            weights: variant.weights.as_deref().or(mesh.weights.as_deref()).unwrap_or_default(),
-            changes: self.morphs.of_primitive(variant.mesh, k),
-            skin: variant.skin.and_then(|s| skins.get(s)).and_then(Option::as_ref),
+            weights: posed.weights.as_deref().or(mesh.weights.as_deref()).unwrap_or_default(),
+            changes: self.morphs.of_primitive(posed.mesh, k),
+            skin: posed.skin.and_then(|s| skins.get(s)).and_then(Option::as_ref),
             needs: needs.cloned().unwrap_or_default(),
-            drawn: variant.drawn,
+            drawn: posed.drawn,
             smooths: self.smooths,
         }
     }

@@ -1,6 +1,7 @@
 //! Gathers what is wrong with a file, sorted by the table of [`super::codes`].
 
 use super::codes::{self, Code, Verdict};
+use crate::load::diagnostic::CUT_OFF;
 use crate::load::{Diagnostic, LoadError, Warnings};
 use std::path::{Path, PathBuf};
 
@@ -55,6 +56,10 @@ impl Report {
     pub(super) fn add(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>) {
         match code.verdict_at(place.as_ref()) {
             Verdict::Refuse => self.refuse(code, place, text),
+            // Parts that a picture can do without.
+            Verdict::Warn if code.row().verdict == Verdict::Refuse => {
+                self.warn_with(code, place, text, "it is left out")
+            }
             Verdict::Warn => self.warn(code, place, text),
             Verdict::Accept => {}
         }
@@ -66,7 +71,12 @@ impl Report {
             self.left_out.push(place.as_ref().to_owned());
             return self.warn_with(code, place, text, "it is left out");
         }
-        let fault = Diagnostic::new(code.name(), &self.file, place.as_ref(), text);
+        self.refuse_with(code, place, text, code.remedy());
+    }
+
+    /// The same where something else helps than does mostly.
+    pub(super) fn refuse_with(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>, remedy: &str) {
+        let fault = Diagnostic::new(code.name(), &self.file, place.as_ref(), text).remedy(remedy);
         let kind = kind(&fault);
         self.faults.push_kind(fault, kind);
     }
@@ -108,6 +118,10 @@ impl Report {
             return Ok(());
         }
         let mut faults = std::mem::take(&mut self.faults).into_vec();
+        if faults.iter().any(|fault| fault.code == Code::AccessorTooLong.name()) {
+            let why = self.warnings.clone().into_vec().into_iter().filter(says_that_data_is_missing);
+            faults.splice(0..0, why.map(|why| why.remedy(CUT_OFF)));
+        }
         let rest = faults.split_off(SHOWN.min(faults.len()));
         if !rest.is_empty() {
             let hidden: u64 = rest.iter().map(|fault| u64::from(fault.count)).sum();
@@ -115,6 +129,17 @@ impl Report {
         }
         Err(LoadError::Input(faults))
     }
+}
+
+/// Whether a warning tells why data that somebody needs is not there.
+fn says_that_data_is_missing(warning: &Diagnostic) -> bool {
+    let codes = [
+        Code::GlbLengthMismatch,
+        Code::GlbUnexpectedEndOfChunkData,
+        Code::GlbChunkTooBig,
+        Code::BufferByteLengthMismatch,
+    ];
+    codes.iter().any(|code| code.name() == warning.code)
 }
 
 /// What a message says without its numbers: the same fault of another node, with another value, is of the same kind.
@@ -160,9 +185,9 @@ mod tests {
             lines,
             [
                 "a.gltf:nodes[0].rotation: the rotation has length 2.000000, not 1 (×1000); the rotation is made unit",
-                "a.gltf:nodes[0].mesh: 0.5 where an index should be (×1000)",
-                "a.gltf:nodes[5].mesh: '5' where an index should be",
-                "a.gltf:nodes[5].mesh: '6' where an index should be",
+                "a.gltf:nodes[0].mesh: 0.5 where an index should be (×1000); it is damaged; export it again",
+                "a.gltf:nodes[5].mesh: '5' where an index should be; it is damaged; export it again",
+                "a.gltf:nodes[5].mesh: '6' where an index should be; it is damaged; export it again",
             ]
         );
     }

@@ -18,7 +18,7 @@ use std::path::Path;
 
 /// A mesh in one shape: morphed by these weights, posed by this skin.
 #[derive(Clone, Debug)]
-pub(super) struct Variant {
+pub(super) struct PosedMesh {
     pub(super) mesh: usize,
     /// Weights of a node or an animation; `None`: those of the mesh count.
     pub(super) weights: Option<Vec<f32>>,
@@ -27,18 +27,18 @@ pub(super) struct Variant {
     pub(super) drawn: bool,
 }
 
-/// A variant in its place.
+/// A posed mesh in its place.
 pub(super) struct Draw {
     /// The node that shows it.
     pub(super) node: usize,
-    pub(super) variant: usize,
+    pub(super) posed: usize,
     pub(super) world: DAffine3,
 }
 
 /// Everything that the nodes of a scene place.
 #[derive(Default)]
 pub(super) struct Placed {
-    pub(super) variants: Vec<Variant>,
+    pub(super) posed: Vec<PosedMesh>,
     pub(super) draws: Vec<Draw>,
     pub(super) cameras: Vec<Camera>,
     pub(super) lights: Vec<Light>,
@@ -109,14 +109,14 @@ pub(super) fn walk(
     Ok(placed)
 }
 
-/// What makes a variant: mesh, skin, and the bits of weights that are not those of the mesh.
+/// What makes a posed mesh: mesh, skin, and the bits of weights that are not those of the mesh.
 type Kind = (usize, Option<usize>, Option<Vec<u32>>);
 
 struct Walk<'a, 'b> {
     reader: Reader<'a>,
     played: Played<'b>,
     placed: Placed,
-    /// Where each variant is in the list.
+    /// Where each posed mesh is in the list.
     known: HashMap<Kind, usize>,
     budget: &'b mut Budget,
     report: &'b mut Report,
@@ -146,13 +146,13 @@ impl Walk<'_, '_> {
         if places.is_empty() && !self.played.moving {
             return Ok(());
         }
-        let Some(variant) = self.variant(i, node, mesh) else { return Ok(()) };
+        let Some(posed) = self.posed(i, node, mesh) else { return Ok(()) };
         let name = node.name.as_ref().map_or(0, String::len);
         let instances = mesh.primitives.len().saturating_mul(size_of::<Instance>() + name);
         self.budget.take(places.len() as u64, (size_of::<Draw>().saturating_add(instances)) as u64)?;
         for world in places {
             if world.is_finite() {
-                self.placed.draws.push(Draw { node: i, variant, world });
+                self.placed.draws.push(Draw { node: i, posed, world });
             } else {
                 let text = "a node without a finite place is left out";
                 self.report.warn(Code::AccessorInvalidFloat, format!("nodes[{i}]"), text);
@@ -195,29 +195,29 @@ impl Walk<'_, '_> {
         Vec::new()
     }
 
-    /// The variant that a node shows.
-    fn variant(&mut self, i: usize, node: &Node, mesh: &Mesh) -> Option<usize> {
+    /// The posed mesh that a node shows.
+    fn posed(&mut self, i: usize, node: &Node, mesh: &Mesh) -> Option<usize> {
         let (index, skin) = (node.mesh?.value(), node.skin.map(|skin| skin.value()));
         let own = self.played.weights.get(&i).or(node.weights.as_ref());
         let weights = own.filter(|own| mesh.weights.as_ref() != Some(*own));
         let bits = weights.map(|weights| weights.iter().map(|w| w.to_bits()).collect());
-        let variants = &mut self.placed.variants;
+        let posed = &mut self.placed.posed;
         Some(*self.known.entry((index, skin, bits)).or_insert_with(|| {
-            variants.push(Variant { mesh: index, weights: weights.cloned(), skin, drawn: true });
-            variants.len() - 1
+            posed.push(PosedMesh { mesh: index, weights: weights.cloned(), skin, drawn: true });
+            posed.len() - 1
         }))
     }
 }
 
-/// Variants for the meshes that no node of the scene shows.
+/// The meshes that no node of the scene shows, at rest.
 fn unused(root: &Root, placed: &mut Placed) {
     let mut shown = vec![false; root.meshes.len()];
-    for variant in &placed.variants {
-        shown.get_mut(variant.mesh).into_iter().for_each(|shown| *shown = true);
+    for posed in &placed.posed {
+        shown.get_mut(posed.mesh).into_iter().for_each(|shown| *shown = true);
     }
     let hidden = shown.iter().enumerate().filter(|(_, shown)| !**shown);
-    let variant = |(mesh, _)| Variant { mesh, weights: None, skin: None, drawn: false };
-    placed.variants.extend(hidden.map(variant));
+    let at_rest = |(mesh, _)| PosedMesh { mesh, weights: None, skin: None, drawn: false };
+    placed.posed.extend(hidden.map(at_rest));
 }
 
 /// KHR_node_visibility: hidden nodes hide their children, but no cameras.

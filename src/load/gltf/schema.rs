@@ -117,7 +117,7 @@ fn channels(root: &Value, report: &mut Report) {
         let samplers = list(animation, "samplers").len() as u64;
         for (k, channel) in list(animation, "channels").iter().enumerate() {
             if let Some(sampler) = channel.get("sampler").and_then(whole).filter(|&s| s >= samplers) {
-                let text = format!("index {sampler}, but only {samplers} samplers exist");
+                let text = format!("index {sampler}, but {} there", counted(samplers, "samplers"));
                 report.add(Code::UnresolvedReference, format!("animations[{i}].channels[{k}].sampler"), text);
             }
         }
@@ -260,7 +260,7 @@ impl<'a> Walk<'a> {
         };
         let count = target.and_then(Value::as_array).map_or(0, Vec::len) as u64;
         if index >= count {
-            self.fault(Code::UnresolvedReference, format!("index {index}, but only {count} {list} exist"));
+            self.fault(Code::UnresolvedReference, format!("index {index}, but {} there", counted(count, list)));
         }
     }
 
@@ -318,6 +318,17 @@ impl<'a> Walk<'a> {
             self.member(name, |walk| walk.value(value, kind));
         }
     }
+}
+
+/// `only 1 mesh is`, `only 3 buffers are`.
+fn counted(count: u64, list: &str) -> String {
+    let things = match list {
+        "KHR_lights_punctual" => "lights",
+        "KHR_materials_variants" => "variants",
+        list => list,
+    };
+    let one = if things == "meshes" { "mesh" } else { things.strip_suffix('s').unwrap_or(things) };
+    if count == 1 { format!("only 1 {one} is") } else { format!("only {count} {things} are") }
 }
 
 /// What decides whether two elements are the same.

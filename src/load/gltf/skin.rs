@@ -8,7 +8,7 @@ use super::codes::Code;
 use super::graph::Graph;
 use super::links::is_bind_matrix;
 use super::report::Report;
-use super::scene::{Draw, Variant};
+use super::scene::{Draw, PosedMesh};
 use crate::math::frame::{center_of_most, spread};
 use crate::math::{DMat3, DMat4, DVec3, Vec3};
 use crate::scene::Mesh;
@@ -27,10 +27,10 @@ pub(super) struct Skin {
     pub(super) center: DVec3,
 }
 
-/// The skins that these variants of meshes have, by number; `None`: one that cannot be used.
-pub(super) fn load(reader: Reader, graph: &Graph, variants: &[Variant], report: &mut Report) -> Vec<Option<Skin>> {
+/// The skins that these meshes have, by number; `None`: one that cannot be used.
+pub(super) fn load(reader: Reader, graph: &Graph, posed: &[PosedMesh], report: &mut Report) -> Vec<Option<Skin>> {
     let root = reader.root;
-    let middles = middles(root, variants);
+    let middles = middles(root, posed);
     (0..root.skins.len())
         .map(|i| {
             check_skeleton(root, graph, i, report);
@@ -44,7 +44,7 @@ pub(super) fn load(reader: Reader, graph: &Graph, variants: &[Variant], report: 
 }
 
 /// The middle of what has each skin, before it is posed, by what accessors say of their bounds; zero where they do not.
-fn middles(root: &Root, variants: &[Variant]) -> Vec<DVec3> {
+fn middles(root: &Root, posed: &[PosedMesh]) -> Vec<DVec3> {
     let corner = |said: &Option<Value>| {
         let numbers = said.as_ref()?.as_array()?.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>()?;
         <[f64; 3]>::try_from(numbers).ok().map(DVec3::from)
@@ -55,9 +55,9 @@ fn middles(root: &Root, variants: &[Variant]) -> Vec<DVec3> {
         Some([corner(&accessor.min)?, corner(&accessor.max)?])
     };
     let mut corners: Vec<Vec<DVec3>> = vec![Vec::new(); root.skins.len()];
-    for variant in variants {
-        let Some(of_skin) = variant.skin.and_then(|skin| corners.get_mut(skin)) else { continue };
-        let primitives = root.meshes.get(variant.mesh).into_iter().flat_map(|mesh| &mesh.primitives);
+    for posed in posed {
+        let Some(of_skin) = posed.skin.and_then(|skin| corners.get_mut(skin)) else { continue };
+        let primitives = root.meshes.get(posed.mesh).into_iter().flat_map(|mesh| &mesh.primitives);
         of_skin.extend(primitives.filter_map(bounds).flatten());
     }
     let middle = |corners: Vec<DVec3>| {

@@ -15,6 +15,7 @@ mod morphs;
 mod mutated;
 mod nodes;
 mod pointers;
+mod refused;
 mod spared;
 mod variants;
 
@@ -213,7 +214,7 @@ fn other_versions_and_unknown_extensions_are_named() {
     assert!(fault(required.to_string().as_bytes()).contains("metallic-roughness materials"));
     assert!(fault(b"{}").contains("'asset' is missing"));
     assert!(fault(b"[]").contains("no glTF file"));
-    assert!(fault(b"{\n\n!").starts_with("a.gltf:3: the JSON cannot be read"));
+    assert!(fault(b"{\n\n!").starts_with("a.gltf:3:1: the JSON cannot be read"));
 }
 
 #[test]

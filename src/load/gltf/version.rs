@@ -48,7 +48,8 @@ pub(super) fn check(root: &Value, report: &mut Report) -> bool {
 fn minimum(root: &Value, version: (u32, u32), report: &mut Report) -> bool {
     let Some(text) = root.pointer("/asset/minVersion").and_then(Value::as_str) else { return true };
     let Some(minimum) = numbers(text) else {
-        report.add(Code::PatternMismatch, "asset.minVersion", "it is not of the form 2.0");
+        let text = format!("version '{}' is not of the form 2.0", crate::load::paths::shorten(text));
+        report.add(Code::PatternMismatch, "asset.minVersion", text);
         return false;
     };
     if minimum > version {
@@ -68,9 +69,7 @@ fn minimum(root: &Value, version: (u32, u32), report: &mut Report) -> bool {
 
 fn one(version: &str, code: Code, report: &mut Report) -> bool {
     let version = crate::load::paths::shorten(version);
-    let text =
-        format!("this is glTF {version}, which is not supported; convert it to glTF 2.0 (gltf-pipeline, Blender)");
-    report.add(code, "asset.version", text);
+    report.add(code, "asset.version", format!("this is glTF {version}, which is not supported"));
     false
 }
 

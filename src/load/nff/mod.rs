@@ -137,25 +137,26 @@ impl Reader<'_> {
 
     fn view(&mut self) -> Result<(), Diagnostic> {
         let (mut eye, mut at, mut up, mut angle, mut size) = (DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 45.0, None);
+        let (mut line_of_angle, mut line_of_place) = (self.words.line, self.words.line);
         while let Some(key @ ("from" | "at" | "up" | "angle" | "hither" | "resolution")) = self.words.peek() {
             self.words.next();
             match key {
-                "from" => eye = self.words.point(key)?,
-                "at" => at = self.words.point(key)?,
+                "from" => (eye, line_of_place) = (self.words.point(key)?, self.words.line),
+                "at" => (at, line_of_place) = (self.words.point(key)?, self.words.line),
                 "up" => up = self.words.point(key)?,
-                "angle" => angle = self.words.number(key)?,
+                "angle" => (angle, line_of_angle) = (self.words.number(key)?, self.words.line),
                 // A near distance, for programs that cannot see closer.
                 "hither" => _ = self.words.number(key)?,
                 _ => size = Some((self.words.whole(key, 1)?, self.words.whole(key, 1)?)),
             }
         }
         if !(angle > 0.0 && angle < 180.0) {
-            return Err(self
-                .words
-                .fault(format!("`angle` is {angle}"), "give it more than 0 and less than 180 degrees"));
+            let remedy = "give it more than 0 and less than 180 degrees";
+            return Err(self.words.fault_at(line_of_angle, format!("`angle` is {angle}"), remedy));
         }
         if eye == at {
-            return Err(self.words.fault("`from` and `at` are the same point", "move one of them"));
+            let text = "`from` and `at` are the same point";
+            return Err(self.words.fault_at(line_of_place, text, "move one of them"));
         }
         self.scene.cameras = vec![Camera {
             name: String::new(),

@@ -65,7 +65,11 @@ fn what_is_wrong_is_told_with_its_line() {
         ("p 4\n0 0 0\n1 0 0\n", "a.nff:3: the file ends inside `p`, where a number should follow"),
         ("p 2\n0 0 0\n1 0 0\n", "a.nff:1: `p` has 2, which is no whole number from 3 to 1000000"),
         ("v from 0 0 0 at 0 0 0", "are the same point"),
-        ("v from 0 0 1 angle 190", "`angle` is 190; give it more than 0 and less than 180 degrees"),
+        ("v\nfrom 1 2 3\nat 1 2 3\nup 0 0 1\nangle 45\n", "a.nff:3: `from` and `at` are the same point"),
+        (
+            "v\nfrom 0 0 1\nangle 190\nhither 1\n",
+            "a.nff:3: `angle` is 190; give it more than 0 and less than 180 degrees",
+        ),
     ] {
         let error = load_text(text).unwrap_err().to_string();
         assert!(error.contains(said), "{text}: {error}");

@@ -1,6 +1,7 @@
 //! Text -> words with their lines. NFF is a stream of words: line ends count as blanks.
 
 use crate::load::Diagnostic;
+use crate::load::diagnostic::CUT_OFF;
 use crate::math::DVec3;
 use std::path::Path;
 
@@ -58,17 +59,22 @@ impl<'a> Words<'a> {
 
     /// A fault at the last word.
     pub(super) fn fault(&self, text: impl Into<String>, remedy: &str) -> Diagnostic {
-        Diagnostic::new("nff-syntax", self.file, self.line.to_string(), text).remedy(remedy)
+        self.fault_at(self.line, text, remedy)
+    }
+
+    /// The same of something that stood in an earlier line.
+    pub(super) fn fault_at(&self, line: u32, text: impl Into<String>, remedy: &str) -> Diagnostic {
+        Diagnostic::new("nff-syntax", self.file, line.to_string(), text).remedy(remedy)
     }
 
     /// A finite number of statement `of`.
     pub(super) fn number(&mut self, of: &str) -> Result<f64, Diagnostic> {
         let Some(word) = self.next() else {
-            return Err(self.fault(format!("the file ends inside `{of}`, where a number should follow"), ""));
+            return Err(self.fault(format!("the file ends inside `{of}`, where a number should follow"), CUT_OFF));
         };
         match word.parse::<f64>() {
             Ok(n) if n.is_finite() => Ok(n),
-            _ => Err(self.fault(format!("`{word}` is no number, in `{of}`"), "")),
+            _ => Err(self.fault(format!("`{word}` is no number, in `{of}`"), "write one")),
         }
     }
 
@@ -93,7 +99,7 @@ impl<'a> Words<'a> {
         if n.fract() == 0.0 && (f64::from(low)..=1e6).contains(&n) {
             return Ok(n as u32);
         }
-        Err(self.fault(format!("`{of}` has {n}, which is no whole number from {low} to 1000000"), ""))
+        Err(self.fault(format!("`{of}` has {n}, which is no whole number from {low} to 1000000"), "write one"))
     }
 }
 

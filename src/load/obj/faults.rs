@@ -4,6 +4,7 @@
 use super::chunk::{ATTRIBUTES, count, whole};
 use super::statements::Tally;
 use crate::load::Diagnostic;
+use crate::load::diagnostic::DAMAGED;
 use crate::load::text::encoding::decode_name;
 use crate::load::text::lines::{Lines, keyword, words};
 use std::path::Path;
@@ -88,7 +89,7 @@ impl Look<'_> {
                 format!("corner {corner} of the face names {what} {number}, but {there} stand before it"),
             ),
         };
-        Diagnostic::new(code, self.file, line.to_string(), text).remedy("export the model again")
+        Diagnostic::new(code, self.file, line.to_string(), text).remedy(DAMAGED)
     }
 
     fn refuse(&mut self, line: u32, fault: Diagnostic) {

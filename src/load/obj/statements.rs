@@ -205,8 +205,13 @@ impl Oddities {
         let few = "a face with fewer than 3 corners is dropped";
         warn("obj-few-corners", &self.few_corners, few.into(), "");
         warn("obj-unknown-statement", &self.unknown, format!("'{}' is not an OBJ statement", self.unknown.word), "");
-        let odd = format!("'{}' is not a number as OBJ writes them; what could be read is used", self.number.word);
-        warn("obj-odd-number", &self.number, odd, "");
+        let odd = format!("'{}' is not a number as OBJ writes them", self.number.word);
+        warn(
+            "obj-odd-number",
+            &self.number,
+            odd,
+            "of numbers what can be read counts, of places without any no face is drawn",
+        );
         let normal = format!("'{}' is not the three numbers of a normal, which is not used", self.normal.word);
         warn("obj-odd-normal", &self.normal, normal, "");
         let short = format!("too few numbers: '{}'", self.short.word);

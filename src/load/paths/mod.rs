@@ -140,12 +140,12 @@ impl FileFault {
                 (Self::MISSING, "put it there, as seen from the model's folder".into())
             }
             Self::Missing(_) => (Self::MISSING, "put it beside the model".into()),
-            Self::NotAFile(_) => ("file-not-plain", String::new()),
+            Self::NotAFile(_) => ("file-not-plain", "name a file".into()),
             Self::TooLarge { remedy, .. } => ("file-too-large", (*remedy).into()),
             Self::Scheme(uri) if is_on_a_drive(uri) => ("uri-scheme", "name it by a relative path".into()),
             Self::Scheme(_) => ("uri-scheme", "download it and name it by a relative path".into()),
-            Self::BadUri(_) => ("uri-invalid", String::new()),
-            Self::Io { .. } => ("file-unreadable", String::new()),
+            Self::BadUri(_) => ("uri-invalid", "name the file by a relative path".into()),
+            Self::Io { .. } => ("file-unreadable", "see that it may be read".into()),
         };
         Diagnostic::new(code, file, place, self.to_string()).remedy(remedy)
     }

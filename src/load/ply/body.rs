@@ -2,6 +2,7 @@
 
 use super::header::{Element, Encoding, Header, Kind};
 use super::packed::Packed;
+use crate::load::diagnostic::{CUT_OFF, DAMAGED};
 use crate::load::paths::shorten;
 use crate::load::text::words::Words;
 use crate::load::{Diagnostic, Source};
@@ -42,8 +43,8 @@ impl<'a> Body<'a> {
     /// The fault of a missing value: `what` it is.
     pub(super) fn missing(&self, missing: &Missing, what: &str) -> Diagnostic {
         match missing {
-            Missing::End => self.fault(format!("the file ends before {what}"), "it was cut off; get it again"),
-            Missing::Word(word) => self.fault(format!("`{}` is no number, in {what}", shorten(word)), ""),
+            Missing::End => self.fault(format!("the file ends before {what}"), CUT_OFF),
+            Missing::Word(word) => self.fault(format!("`{}` is no number, in {what}", shorten(word)), DAMAGED),
         }
     }
 
@@ -76,7 +77,7 @@ impl<'a> Body<'a> {
         }
         let name = shorten(&element.name);
         let text = format!("the header claims {count} × `{name}` of at least {least} bytes, but {left} bytes are left");
-        Err(self.fault(text, "it was cut off; get it again"))
+        Err(self.fault(text, CUT_OFF))
     }
 
     /// The next value.

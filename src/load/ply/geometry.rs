@@ -8,6 +8,7 @@ use super::meaning::{
 };
 use super::packed::Record;
 use super::told::passed_over;
+use crate::load::diagnostic::DAMAGED;
 use crate::load::geometry::NONE;
 use crate::load::geometry::bare::{Bare, Said};
 use crate::load::limits::Budget;
@@ -458,8 +459,13 @@ impl Reader<'_, '_> {
         let is_there = value >= 0.0 && value < self.vertices as f64 && value.fract() == 0.0;
         if !is_there {
             let (name, vertices) = (shorten(&element.name), self.vertices);
-            let text = format!("corner {corner} of {name} {i} is vertex {value}, but only {vertices} vertices exist");
-            return Err(self.body.fault(text, "it is damaged; export it again"));
+            let exist = if vertices == 0 {
+                "there are none before it".into()
+            } else {
+                format!("only {vertices} vertices exist")
+            };
+            let text = format!("corner {corner} of {name} {i} is vertex {value}, but {exist}");
+            return Err(self.body.fault(text, DAMAGED));
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just before")]
         Ok(value as u32)
@@ -503,7 +509,7 @@ impl Reader<'_, '_> {
         let value = self.body.value(kind).map_err(|why| self.missing(&why, element, i, property))?;
         if value.fract() != 0.0 || !(0.0..=f64::from(u32::MAX)).contains(&value) {
             let text = format!("{value} is no length of a list, in {}", named(element, i, property));
-            return Err(self.body.fault(text, "it is damaged; export it again"));
+            return Err(self.body.fault(text, DAMAGED));
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just before")]
         Ok(value as u64)

@@ -1,6 +1,7 @@
 //! The header of a PLY file: lines of words that end with `end_header`.
 
 use crate::load::Diagnostic;
+use crate::load::diagnostic::CUT_OFF;
 use crate::load::finder::unquote;
 use crate::load::paths::shorten;
 use crate::load::text::encoding::decode_name;
@@ -157,7 +158,7 @@ impl Header {
                 return Ok(Self { encoding, elements, comments, pictures, length: lines.at, lines: lines.count });
             }
         }
-        Err(parts.fault("the file ends inside the header, before `end_header`", "it was cut off; get it again"))
+        Err(parts.fault("the file ends inside the header, before `end_header`", CUT_OFF))
     }
 
     /// The element of a name.

@@ -4,7 +4,7 @@ use super::reader::Faults;
 use super::{FORMAT, Model, Parsed, Surrounding, shapes};
 use crate::load::limits::{Budget, Limits};
 use crate::load::panorama::{self, LoadedPanorama};
-use crate::load::paths::Resolver;
+use crate::load::paths::{FileFault, Resolver, shorten};
 use crate::load::texture::smaller_copies;
 use crate::load::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings, detect};
 use crate::scene::merge::Stored;
@@ -51,7 +51,8 @@ fn check_files(
 ) -> Result<(), LoadError> {
     let of_models = models.iter().map(|model| (&model.file, model.at));
     for (file, at) in of_models.chain(panorama.map(|picture| (&picture.file, picture.at))) {
-        if let Err(fault) = resolver.locate(Path::new(file)) {
+        let elsewhere = file.contains("://").then(|| FileFault::Scheme(shorten(file)));
+        if let Some(fault) = elsewhere.or_else(|| resolver.locate(Path::new(file)).err()) {
             faults.note_file(at, &fault);
         }
     }

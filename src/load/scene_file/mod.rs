@@ -342,7 +342,7 @@ fn background(value: &DeValue) -> Result<Background, String> {
     match value.as_str() {
         Some("transparent") => Ok(Background::Transparent),
         Some("environment" | "env") => Ok(Background::Environment),
-        _ => color(value).map(Background::Color),
+        _ => color(value).map(Background::Color).map_err(|why| why + "; or `transparent` or `environment`"),
     }
 }
 
@@ -372,7 +372,10 @@ fn environment(value: &DeValue) -> Result<Environment, String> {
     match value.as_str() {
         Some("studio") => Ok(Environment::Studio),
         Some("black") => Ok(Environment::Black),
-        _ => color(value).map(Environment::Constant),
+        _ => {
+            let others = "; or `studio`, `black`, or a picture (.hdr, .exr, .png, .jpg)";
+            color(value).map(Environment::Constant).map_err(|why| why + others)
+        }
     }
 }
 

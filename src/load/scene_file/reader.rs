@@ -62,7 +62,12 @@ impl Faults {
 
     /// Notes that a file is named at this byte that cannot be read.
     pub(super) fn note_file(&self, at: usize, fault: &FileFault) {
-        let Diagnostic { code, text, remedy, .. } = fault.diagnose(&self.file, "");
+        let Diagnostic { code, text, mut remedy, .. } = fault.diagnose(&self.file, "");
+        // What else names files is a model.
+        let text = text.replace("outside the model's folder", "outside the scene file's folder");
+        if matches!(fault, FileFault::Missing(_)) {
+            remedy = remedy.replace("the model", "the scene file");
+        }
         self.note(code, &(at..at), text, remedy);
     }
 
@@ -187,7 +192,14 @@ impl<'a> Table<'a> {
         for (key, value) in entries {
             match value.get_ref().as_table() {
                 Some(map) => tables.push((key.get_ref().to_string(), Table::new(self.faults, what, key.span(), map))),
-                None => self.note(&key.span(), format!("`{}` is not a {what} table", key.get_ref()), ""),
+                None => {
+                    let name = key.get_ref();
+                    self.note(
+                        &key.span(),
+                        format!("`{name}` is not a {what} table"),
+                        format!("begin it with [{what}s.{name}]"),
+                    );
+                }
             }
         }
         tables
@@ -236,7 +248,10 @@ pub(super) fn number(value: &DeValue) -> Result<f64, String> {
         DeValue::Float(f) => f.as_str().parse().ok(),
         _ => return expected("a number", value),
     };
-    parsed.filter(|n: &f64| n.is_finite()).ok_or_else(|| "must be a finite number".into())
+    match parsed {
+        Some(n) if f64::is_finite(n) => Ok(n),
+        other => Err(format!("is {}, but must be a finite number", other.unwrap_or(f64::INFINITY))),
+    }
 }
 
 /// A number in `low..=high`.

@@ -149,7 +149,11 @@ fn check_faces(table: &Table, positions: usize, faces: &[Vec<u32>]) {
             table.note(&at, format!("face {i} has {} corners", face.len()), "give it 3 or more");
         }
         if let Some(corner) = face.iter().find(|c| **c as usize >= positions) {
-            table.note(&at, format!("face {i} has corner {corner}, but only {positions} positions exist"), "");
+            table.note(
+                &at,
+                format!("face {i} has corner {corner}, but only {positions} positions exist"),
+                "count from 0",
+            );
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Binary STL: 80 bytes of anything, the number of triangles, and 50 bytes for each.
 
 use super::Making;
+use crate::load::diagnostic::CUT_OFF;
 use crate::load::geometry::bare::Bare;
 use crate::load::{Diagnostic, Source};
 use crate::math::DVec3;
@@ -34,7 +35,7 @@ pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnost
     let bytes = source.bytes.as_slice();
     let fault = |at: usize, text: String| {
         let fault = Diagnostic::new("stl-cut-off", &source.path, format!("byte {at}"), text);
-        fault.remedy("it was cut off; get it again")
+        fault.remedy(CUT_OFF)
     };
     let claimed = claimed(bytes)
         .ok_or_else(|| fault(bytes.len(), format!("the file ends inside its header of {HEADER} bytes")))?;

@@ -5,6 +5,7 @@
 //! `endfacet`, or write colours, which no two programs write alike and which are not read.
 
 use super::Making;
+use crate::load::diagnostic::{CUT_OFF, DAMAGED};
 use crate::load::geometry::bare::Bare;
 use crate::load::paths::shorten;
 use crate::load::text::{without_mark, words};
@@ -141,7 +142,7 @@ impl<'a> Words<'a> {
             [] => format!("the file ends where {expected} should follow"),
             word => format!("`{}` where {expected} should be", shorten(&String::from_utf8_lossy(word))),
         };
-        let remedy = if word.is_empty() { "it was cut off; get it again" } else { "it is damaged; export it again" };
+        let remedy = if word.is_empty() { CUT_OFF } else { DAMAGED };
         Diagnostic::new("stl-syntax", self.file, self.words.line.to_string(), text).remedy(remedy)
     }
 

@@ -57,6 +57,44 @@ fn four_rays_see_the_sun_in_a_rough_mirror_as_bright_as_all_of_its_facets_do() {
     }
 }
 
+#[test]
+fn what_facets_would_send_to_the_wrong_side_is_sent_to_the_right_one_in_sight_of_the_sun_too() {
+    // Suns of a little less than what glare may be and of a little more, which only rays that are spread see.
+    let light = |texels: usize, rays: u32, material: Material, from: DVec3| {
+        let (sky, radiance, area) = sun(texels);
+        let mut s = under(sky, 1.0);
+        s.view = View::look_at(from, DVec3::ZERO, DVec3::Y, Lens::orthographic(0.01));
+        (s.settings.samples, s.settings.gloss_rays) = (1024, Some(rays));
+        s.square(0.0, 9.0, material);
+        (s.color().x - 0.1) / (radiance * area)
+    };
+    let metal = || rough(MetalRough { metallic: 1.0, roughness: 1.0, ..MetalRough::default() });
+    for (material, side) in [(metal(), 1.0), (frosted(1.0), -1.0)] {
+        let from = DVec3::new(3.0, 0.0, side);
+        let (glare, spread) = (light(11, 1, material.clone(), from), light(12, 64, material, from));
+        assert!((glare / spread - 1.0).abs() < 0.06, "{side}: {glare}, {spread}");
+    }
+}
+
+#[test]
+fn backs_that_nobody_sees_hide_no_sun_from_a_rough_mirror() {
+    let seen = |faces_up: Option<bool>| {
+        let (sky, ..) = sun(8);
+        let mut s = under(sky, 0.5);
+        s.plane(DVec3::Z, 0.0, rough(MetalRough { metallic: 1.0, roughness: 0.5, ..MetalRough::default() }));
+        (s.settings.samples, s.settings.gloss_rays) = (4096, Some(16));
+        if let Some(faces_up) = faces_up {
+            let turned = DAffine3::from_rotation_x(if faces_up { 0.0 } else { std::f64::consts::PI });
+            let black = Material { base_color: Vec3::ZERO, ..Material::default() };
+            s.mesh(square(if faces_up { 2.0 } else { -2.0 }, 9.0), turned, black);
+        }
+        s.color().x
+    };
+    let (open, behind) = (seen(None), seen(Some(true)));
+    assert!((behind / open - 1.0).abs() < 0.1, "{behind} of {open}");
+    assert!(seen(Some(false)) < 0.2 * open);
+}
+
 /// What a frosted pane lets through, seen from straight before it.
 fn let_through(roughness: f32) -> f32 {
     let mut s = looking_down(-0.5);

@@ -109,24 +109,35 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
-    fn of_sampler(&self, part: &str) -> String {
+    fn of_sampler(&self, part: Part) -> String {
+        let part = match part {
+            Part::Input => "input",
+            Part::Interpolation => "interpolation",
+            Part::Output => "output",
+        };
         format!("{}.samplers[{}].{part}", self.animation, self.sampler)
     }
 }
 
-/// Bytes that a weight of a morph target takes: in the pose, in the variant of the mesh, and in what tells variants apart.
+/// Bytes that a weight of a morph target takes: in the pose, in the posed mesh, and in what tells posed meshes apart.
 const WEIGHT: u64 = 3 * size_of::<f32>() as u64;
 
-/// The accessors of a sampler.
-const INPUT: &str = "input";
-const OUTPUT: &str = "output";
+/// A property of a sampler.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    /// The times of its keys.
+    Input,
+    Interpolation,
+    /// The values of its keys.
+    Output,
+}
 
 /// Why a channel is left out.
 enum Fault {
     /// Of the channel itself.
     Target(Code, String),
-    /// Of its sampler's `input` or `output`.
-    Sampler(&'static str, Code, String),
+    /// Of a part of its sampler.
+    Sampler(Part, Code, String),
     /// Of data in a file that cannot be read.
     File(Diagnostic),
     /// The schema check has told of it.
@@ -139,8 +150,9 @@ impl Fault {
         match self {
             Self::Target(code, text) => report.warn_with(code, format!("{}.target", place.channel), text, left_out),
             // Channels share times, and they are looked at once.
-            Self::Sampler(part, code, text) if part == INPUT => {
-                report.warn_with(code, place.of_sampler(part), text, "channels with these times are left out");
+            Self::Sampler(Part::Input, code, text) => {
+                let left_out = "channels with these times are left out";
+                report.warn_with(code, place.of_sampler(Part::Input), text, left_out);
             }
             Self::Sampler(part, code, text) => report.warn_with(code, place.of_sampler(part), text, left_out),
             Self::File(why) => report.warnings.push(why),
@@ -148,7 +160,7 @@ impl Fault {
         }
     }
 
-    fn unreadable(part: &'static str, why: Unreadable) -> Self {
+    fn unreadable(part: Part, why: Unreadable) -> Self {
         match why {
             Unreadable::Nowhere(why) | Unreadable::Buffer(why) => Self::File(why),
             Unreadable::Data(code, text) => Self::Sampler(part, code, text),
@@ -203,7 +215,7 @@ impl<'a> Player<'a, '_> {
             Ok(times) => {
                 if let Some(k) = times.windows(2).position(|pair| pair[0] == pair[1]) {
                     let text = format!("times {k} and {} are both {} s", k + 1, times[k]);
-                    let (code, place) = (Code::AccessorAnimationInputNonIncreasing, place.of_sampler(INPUT));
+                    let (code, place) = (Code::AccessorAnimationInputNonIncreasing, place.of_sampler(Part::Input));
                     self.report.warn_with(code, place, text, "the later key counts");
                 }
                 Some(times)
@@ -236,7 +248,7 @@ impl<'a> Player<'a, '_> {
                 keys.check(Type::Vec4, 1)?;
                 let (before, after) = keys.around::<4>(between, 1)?;
                 let rotation = curve::rotation(channel.interpolation, between, &before, &after).ok_or_else(|| {
-                    Fault::Sampler(OUTPUT, Code::AccessorAnimationQuaternion, "a rotation of length 0".into())
+                    Fault::Sampler(Part::Output, Code::AccessorAnimationQuaternion, "a rotation of length 0".into())
                 })?;
                 self.pose.moved.entry(node).or_default().rotation = Some(rotation);
             }
@@ -256,7 +268,7 @@ impl<'a> Player<'a, '_> {
                 let (before, _) = keys.around::<1>(between, 1)?;
                 if channel.interpolation != Interpolation::Step {
                     let text = "there is nothing between true and false";
-                    let place = place.of_sampler("interpolation");
+                    let place = place.of_sampler(Part::Interpolation);
                     self.report.note("gltf-animation-switch", place, text, "it is switched in steps");
                 }
                 json!(before.value.first().is_some_and(|&on| on != 0.0))
@@ -267,7 +279,7 @@ impl<'a> Player<'a, '_> {
                     // Splines swing beyond their keys.
                     if channel.interpolation != Interpolation::CubicSpline {
                         let text = format!("{number} where {range} is allowed");
-                        let (code, place) = (Code::ValueNotInRange, place.of_sampler(OUTPUT));
+                        let (code, place) = (Code::ValueNotInRange, place.of_sampler(Part::Output));
                         self.report.warn_with(code, place, text, "the nearest that is allowed is taken");
                     }
                     *number = range.nearest(*number);
@@ -341,12 +353,12 @@ fn weights_at_rest(reader: Reader, owner: Entry, mesh: Option<&gltf::json::Mesh>
 
 /// Times that are finite and never go back.
 fn read_times(reader: Reader, input: Index<Accessor>) -> Result<Rc<[f32]>, Fault> {
-    let fault = |code, text: String| Fault::Sampler(INPUT, code, text);
+    let fault = |code, text: String| Fault::Sampler(Part::Input, code, text);
     let format = reader.root.accessors.get(input.value()).and_then(Format::of).ok_or(Fault::Told)?;
     if format.component != ComponentType::F32 || format.shape != Type::Scalar {
         return Err(fault(Code::AnimationInputFormat, "times must be single floats".into()));
     }
-    let times = reader.floats::<1>(input, Pick::All).map_err(|why| Fault::unreadable(INPUT, why))?;
+    let times = reader.floats::<1>(input, Pick::All).map_err(|why| Fault::unreadable(Part::Input, why))?;
     let times: Rc<[f32]> = times.into_iter().map(|[time]| time).collect();
     if let Some(k) = times.iter().position(|time| !time.is_finite()) {
         return Err(fault(Code::AccessorInvalidFloat, format!("time {k} is {}", times[k])));
@@ -374,7 +386,7 @@ impl Keys<'_> {
     fn check(&self, shape: Type, each: usize) -> Result<(), Fault> {
         let accessor = self.reader.root.accessors.get(self.channel.output.value()).ok_or(Fault::Told)?;
         let format = Format::of(accessor).ok_or(Fault::Told)?;
-        let fault = |code, text: String| Err(Fault::Sampler(OUTPUT, code, text));
+        let fault = |code, text: String| Err(Fault::Sampler(Part::Output, code, text));
         if format.shape != shape || !self.channel.numbers.fits(format) {
             let count = match shape {
                 Type::Vec2 => "two",
@@ -423,11 +435,11 @@ impl Keys<'_> {
         let first = key.checked_mul(elements).ok_or(Fault::Told)?;
         let wanted: Option<Vec<u32>> = (first..first + elements).map(|i| u32::try_from(i).ok()).collect();
         let read = self.reader.floats::<N>(self.channel.output, Pick::Only(&wanted.ok_or(Fault::Told)?));
-        let read = read.map_err(|why| Fault::unreadable(OUTPUT, why))?;
+        let read = read.map_err(|why| Fault::unreadable(Part::Output, why))?;
         let numbers: Vec<f64> = read.iter().flatten().map(|&x| f64::from(x)).collect();
         if let Some(odd) = numbers.iter().find(|x| !x.is_finite()) {
             let text = format!("a value of key {key} is {odd}");
-            return Err(Fault::Sampler(OUTPUT, Code::AccessorInvalidFloat, text));
+            return Err(Fault::Sampler(Part::Output, Code::AccessorInvalidFloat, text));
         }
         if self.channel.interpolation != Interpolation::CubicSpline {
             return Ok(Key { value: numbers, ..Key::default() });

@@ -25,7 +25,8 @@ fn indices_that_point_outside_are_refused_with_their_numbers() {
     let (positions, indices) = (file.triangle(), file.shorts(&[0, 1, 3]));
     file.primitive(json!({"attributes": {"POSITION": positions}, "indices": indices}));
     let message = file.fault();
-    assert_eq!(message, "a.gltf:meshes[0].primitives[0].indices: index 3 at position 2, but only 3 vertices exist");
+    let told = "a.gltf:meshes[0].primitives[0].indices: index 3 at position 2, but only 3 vertices exist";
+    assert_eq!(message, format!("{told}; it is damaged; export it again"));
     let mut file = Builder::new();
     let (positions, indices) = (file.triangle(), file.shorts(&[0, 1, 0xffff]));
     file.primitive(json!({"attributes": {"POSITION": positions}, "indices": indices}));

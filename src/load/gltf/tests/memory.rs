@@ -41,9 +41,9 @@ fn deep_nesting_is_one_line_wherever_it_is() {
             let close = if closed { close.repeat(depth) } else { String::new() };
             let text = format!(r#"{{"asset": {{"version": "2.0"}}, "extras": {}0{close}}}"#, open.repeat(depth));
             let message = refused(Path::new("a.gltf"), text.as_bytes(), 8 << 30);
-            let told =
-                format!("a.gltf: the JSON cannot be read: it is nested {} deep where 127 are allowed", depth + 1);
-            assert_eq!(message, told);
+            let why = format!("it is nested {} deep where 127 are allowed", depth + 1);
+            let remedy = "export it with less in each other";
+            assert_eq!(message, format!("a.gltf: the JSON cannot be read: {why}; {remedy}"));
         }
     }
 }

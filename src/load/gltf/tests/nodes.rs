@@ -55,7 +55,10 @@ fn a_scene_is_chosen_by_index_or_name_and_without_scenes_all_roots_show() {
     assert_eq!(shown(None), Ok(("a".into(), 0)));
     assert_eq!(shown(Some("1")), Ok(("b".into(), 1)));
     assert_eq!(shown(Some("second")), Ok(("b".into(), 1)));
-    assert_eq!(shown(Some("third")), Err("a.gltf:scenes: there is no scene 'third'; it has 0, 1 'second'".to_string()));
+    assert_eq!(
+        shown(Some("third")),
+        Err("a.gltf:scenes: there is no scene 'third'; it has number 0, 1 'second'".to_string())
+    );
     file.set("scenes", json!([{"nodes": [0], "name": "same"}, {"nodes": [1], "name": "same"}]));
     let shown = |wish: &str| {
         let options = LoadOptions { scene: Some(wish.into()), ..LoadOptions::default() };

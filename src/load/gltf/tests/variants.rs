@@ -110,7 +110,7 @@ fn of_two_mappings_for_a_variant_the_first_counts_with_a_warning() {
 #[test]
 fn a_mapping_to_what_is_not_there_refuses_the_file() {
     for (mapping, part) in [
-        (json!({"material": 7, "variants": [0]}), "material: index 7, but only 3 materials exist"),
+        (json!({"material": 7, "variants": [0]}), "material: index 7, but only 3 materials are there"),
         (json!({"material": 0, "variants": [9]}), "variants[0]: index 9, but only 3"),
         (json!({"material": 0}), "'variants' is missing"),
     ] {
