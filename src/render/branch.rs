@@ -208,7 +208,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let to = above(mirrored, normal);
         if share != Vec3::ZERO && normal.dot(to) > 0.0 {
             let weight = point.path.weight * share * (1.0 / rough.rays as f32);
-            self.send_spread(point, above(to, geometric), RayClass::Reflected, rough, |path| Path {
+            self.send_spread(point, above(to, geometric), (RayClass::Reflected, MIRROR), rough, |path| Path {
                 weight,
                 calm: rough.calm.mirrored,
                 ..path.turned(RayClass::Reflected, k + 1)
@@ -244,7 +244,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let weight = point.path.weight * share * color * (1.0 / rough.rays as f32);
         let media = crossing.beyond;
         let straight = point.path.straight && crossing.n_i == crossing.n_t;
-        self.send_spread(point, above(to, -geometric), RayClass::Refracted, rough, |path| Path {
+        let turns = crossing.turns();
+        self.send_spread(point, above(to, -geometric), (RayClass::Refracted, turns), rough, |path| Path {
             weight,
             band,
             media,
@@ -258,11 +259,11 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         &mut self,
         point: &Point<G>,
         dir: Vec3,
-        class: RayClass,
+        (class, turns): (RayClass, f32),
         rough: &Rough,
         finish: impl FnOnce(Path) -> Path,
     ) {
-        let path = finish(point.bounced(self.context, Vec3::ZERO, MIRROR));
+        let path = finish(point.bounced(self.context, Vec3::ZERO, turns));
         let part = path.part * (1.0 / rough.rays as f32);
         if !self.context.is_alive(path.weight, part) {
             return;
@@ -338,9 +339,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             return self.send_reflected(point, normal, weight, band);
         };
         let dir = above(bent, -geometric);
-        // As far as directions turn when light falls in steeply.
-        let turns = (1.0 - crossing.n_i / crossing.n_t).abs();
-        let path = point.bounced(self.context, weight, turns).turned(RayClass::Refracted, turn);
+        let path = point.bounced(self.context, weight, crossing.turns()).turned(RayClass::Refracted, turn);
         let mut path = Path { band, media: crossing.beyond, ..path };
         if !self.goes_on(point, &mut path) {
             return;

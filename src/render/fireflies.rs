@@ -34,12 +34,14 @@ const SELDOM: usize = 2;
 /// What is this part as bright is nearly as bright.
 const NEARLY: f32 = 0.25;
 
-/// Fireflies are looked for so many tiles away: what one of thousands of samples meets is then hardly overlooked.
+/// So many pixels across are a cell.
+const CELL: u32 = TILE;
+/// Fireflies are looked for so many cells away: what one of thousands of samples meets is then hardly overlooked.
 const REACH: usize = 2;
-/// Fewest fireflies that tell how many there are in a tile, in nine, and in all of these.
+/// Fewest fireflies that tell how many there are in a cell, in nine, and in all of these.
 const FEWEST: [u32; REACH + 1] = [4, 2, 1];
 
-/// What samples of some tiles have shown that may have met something by chance.
+/// What samples of some cells have shown that may have met something by chance.
 #[derive(Clone, Copy, Debug, Default)]
 struct Told {
     samples: u32,
@@ -70,10 +72,18 @@ impl Told {
 /// Where fireflies were met.
 #[derive(Debug)]
 pub(super) struct Fireflies {
-    /// Tiles in a row.
+    /// Cells in a row.
     columns: usize,
-    /// How bright those in and around each tile are on average, after exposure; 0 where there are none that matter.
-    brightness: Vec<f32>,
+    cells: Vec<Cell>,
+}
+
+/// What is known of the fireflies in and around a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Cell {
+    /// How bright they are on average, after exposure; 0 where there are none that matter.
+    brightness: f32,
+    /// How much too dark pixels are without those that do not matter, as they are written.
+    missed: f32,
 }
 
 /// A sample of a pixel that was asked.
@@ -153,16 +163,16 @@ pub(super) fn look<P: Observer>(
     counts.extend(more);
     if complete {
         rays += bright.len() as u64 * u64::from(AGAIN);
-        let (rare, told) = (answers.into_iter().flatten().collect(), asked.in_tiles((TILE / step) as usize));
+        let (rare, told) = (answers.into_iter().flatten().collect(), asked.in_cells((CELL / step) as usize));
         let output = output(how.space, question.frame.background);
         let judge = Certainty::of(question.frame, how, output.as_ref(), context.scene.background);
-        let matters = |light, more| judge.grey(light + more) - judge.grey(light) > missed_at_most(how);
-        context.fireflies = Some(Arc::new(Fireflies::among(rare, &told, matters)));
+        let missing = |light, more| judge.grey(light + more) - judge.grey(light);
+        context.fireflies = Some(Arc::new(Fireflies::among(rare, &told, missing, missed_at_most(how))));
     }
     (rays, counts)
 }
 
-/// How much too dark all pixels of some tiles may be, as they are written.
+/// How much too dark all pixels of some cells may be, as they are written.
 fn missed_at_most(how: &Stochastic) -> f32 {
     /// Part of what a single pixel may be wrong by.
     const OF_PIXEL: f32 = 0.25;
@@ -235,20 +245,20 @@ impl Grid {
         }
     }
 
-    /// What was asked of each tile of so many columns and rows of samples, of what may have met something by chance; and tiles in
+    /// What was asked of each cell of so many columns and rows of samples, of what may have met something by chance; and cells in
     /// a row.
-    fn in_tiles(&self, side: usize) -> (Vec<Told>, usize) {
+    fn in_cells(&self, side: usize) -> (Vec<Told>, usize) {
         let columns = self.columns.div_ceil(side);
-        let mut tiles = vec![Told::default(); columns * self.rows.div_ceil(side)];
+        let mut cells = vec![Told::default(); columns * self.rows.div_ceil(side)];
         for (y, x) in (0..self.rows).flat_map(|y| (0..self.columns).map(move |x| (y, x))) {
             let Asked { light, by_chance } = self.each[y * self.columns + x];
             if by_chance {
-                let tile = &mut tiles[y / side * columns + x / side];
-                tile.samples += 1;
-                tile.light += f64::from(light.clamp(0.0, 1.0));
+                let cell = &mut cells[y / side * columns + x / side];
+                cell.samples += 1;
+                cell.light += f64::from(light.clamp(0.0, 1.0));
             }
         }
-        (tiles, columns)
+        (cells, columns)
     }
 
     /// The pixels whose samples may be fireflies.
@@ -278,39 +288,55 @@ impl Grid {
 }
 
 impl Fireflies {
-    /// These, in a picture of which the tiles were told so much, where they matter: told how bright pixels are, and how much more
-    /// light the fireflies bring on average.
-    fn among(mut each: Vec<Bright>, (tiles, columns): &(Vec<Told>, usize), matters: impl Fn(f32, f32) -> bool) -> Self {
+    /// These, in a picture of which the cells were told so much. They matter where without them pixels are too dark by more than
+    /// `most`: by how much, is told by how bright these are, and how much more light the fireflies bring on average.
+    fn among(
+        mut each: Vec<Bright>,
+        (told, columns): &(Vec<Told>, usize),
+        missing: impl Fn(f32, f32) -> f32,
+        most: f32,
+    ) -> Self {
         // Threads answer in any order; sums have one.
         each.sort_unstable_by_key(|bright| bright.pixel);
-        let (mut tiles, columns, rows) = (tiles.clone(), *columns, tiles.len() / (*columns).max(1));
+        let (mut told, columns, rows) = (told.clone(), *columns, told.len() / (*columns).max(1));
         for Bright { pixel: (x, y), light } in each {
-            let tile = &mut tiles[(y / TILE) as usize * columns + (x / TILE) as usize];
-            tile.bright += f64::from(light);
-            tile.fireflies += 1;
+            let cell = &mut told[(y / CELL) as usize * columns + (x / CELL) as usize];
+            cell.bright += f64::from(light);
+            cell.fireflies += 1;
         }
         let around = |i: usize, reach: usize| {
             let near = |at: usize, end: usize| at.saturating_sub(reach)..(at + reach + 1).min(end);
-            let tiles = near(i / columns, rows).flat_map(|row| &tiles[row * columns..][near(i % columns, columns)]);
-            tiles.fold(Told::default(), Told::with)
+            let cells = near(i / columns, rows).flat_map(|row| &told[row * columns..][near(i % columns, columns)]);
+            cells.fold(Told::default(), Told::with)
         };
-        let brightness = (0..tiles.len()).map(|i| {
-            let do_matter = |reach: usize| {
-                let told = around(i, reach);
-                // One in a tile may be the only one for many tiles around.
-                told.fireflies >= FEWEST[reach] && matters(told.mean(told.light), told.mean(told.bright))
-            };
+        let cells = (0..told.len()).map(|i| {
+            // One in a cell may be the only one for many cells around.
+            let known = (0..=REACH).map(|reach| (around(i, reach), FEWEST[reach]));
+            let known = known.filter(|(told, fewest)| told.fireflies >= *fewest).map(|(told, _)| told);
+            let missed = known.map(|told| missing(told.mean(told.light), told.mean(told.bright))).fold(0.0, f32::max);
+            if missed <= most {
+                return Cell { missed, ..Cell::default() };
+            }
             let Told { bright, fireflies, .. } = around(i, REACH);
             #[expect(clippy::cast_possible_truncation, reason = "as exact as light is")]
             let mean = (bright / f64::from(fireflies.max(1))) as f32;
-            if (0..=REACH).any(do_matter) { mean } else { 0.0 }
+            Cell { brightness: mean, ..Cell::default() }
         });
-        Self { columns, brightness: brightness.collect() }
+        Self { columns, cells: cells.collect() }
+    }
+
+    fn cell(&self, (x, y): (u32, u32)) -> &Cell {
+        &self.cells[(y / CELL) as usize * self.columns + (x / CELL) as usize]
     }
 
     /// How bright those are that a pixel may meet by chance; 0: none.
-    pub(super) fn at(&self, (x, y): (u32, u32)) -> f32 {
-        self.brightness[(y / TILE) as usize * self.columns + (x / TILE) as usize]
+    pub(super) fn at(&self, pixel: (u32, u32)) -> f32 {
+        self.cell(pixel).brightness
+    }
+
+    /// How much too dark a pixel is by those that it may meet by chance and does not wait for, as it is written.
+    pub(super) fn missed_at(&self, pixel: (u32, u32)) -> f32 {
+        self.cell(pixel).missed
     }
 }
 
@@ -341,13 +367,14 @@ mod tests {
     }
 
     #[test]
-    fn pixels_hear_of_fireflies_in_their_tile_and_two_tiles_around_it() {
+    fn pixels_hear_of_fireflies_in_their_cell_and_two_cells_around_it() {
         let (bright, told) = (|x, y, light| Bright { pixel: (x, y), light }, Told { samples: 256, ..Told::default() });
         let each = vec![bright(180, 6, 4.0), bright(16, 6, 30.0), bright(24, 18, 50.0)];
-        let found = Fireflies::among(each, &(vec![told; 14], 7), |_, more| more > 0.0);
+        let found = Fireflies::among(each, &(vec![told; 14], 7), |_, more| more, 0.0);
         let heard = [0, 31, 32, 95, 96, 127, 128, 193].map(|x| found.at((x, 0)));
         assert_eq!(heard, [40.0, 40.0, 40.0, 40.0, 4.0, 4.0, 4.0, 4.0]);
-        assert_eq!(found.at((0, 39)), 40.0, "the row of tiles below");
+        assert_eq!(found.at((0, 39)), 40.0, "the row of cells below");
+        assert_eq!(found.missed_at((0, 0)), 0.0, "they are waited for");
     }
 
     #[test]
@@ -355,14 +382,16 @@ mod tests {
         let told = Told { samples: 256, light: 25.6, ..Told::default() };
         let of = |fireflies: u32, least: f32| {
             let each = (0..fireflies).map(|i| Bright { pixel: (70 + i, 7), light: 10.0 });
-            let matters = move |light: f32, more: f32| (light - 0.1).abs() < 1e-6 && more > least;
-            let found = Fireflies::among(each.collect(), &(vec![told; 5], 5), matters);
-            [0, 32, 64].map(|x| found.at((x, 0)))
+            let missing = |light: f32, more: f32| if (light - 0.1).abs() < 1e-6 { more } else { 0.0 };
+            let found = Fireflies::among(each.collect(), &(vec![told; 5], 5), missing, least);
+            [0, 32, 64].map(|x| (found.at((x, 0)), found.missed_at((x, 0))))
         };
-        // Of five tiles in a row all are near the middle one, three next to it.
+        // Of five cells in a row all are near the middle one, three next to it.
         let mean = |fireflies: f32, tiles: f32| fireflies * 10.0 / (256.0 * tiles);
-        assert_eq!(of(1, 0.99 * mean(1.0, 5.0)), [10.0; 3], "anywhere");
-        assert_eq!(of(4, 1.01 * mean(4.0, 3.0)), [0.0, 0.0, 10.0], "in their tile alone");
-        assert_eq!(of(2, 1.01 * mean(2.0, 3.0)), [0.0; 3], "two tell nothing of a tile");
+        assert_eq!(of(1, 0.99 * mean(1.0, 5.0)), [(10.0, 0.0); 3], "anywhere");
+        let missed = mean(4.0, 3.0);
+        assert_eq!(of(4, 1.01 * missed), [(0.0, missed), (0.0, missed), (10.0, 0.0)], "in their cell alone");
+        let missed = mean(2.0, 3.0);
+        assert_eq!(of(2, 1.01 * missed), [(0.0, missed); 3], "two tell nothing of a cell");
     }
 }

@@ -69,6 +69,15 @@ pub(super) struct PixelFacts {
     pub end: End,
 }
 
+impl PixelFacts {
+    /// Adds what the mean is too dark by, as it is written, because no sample has met it.
+    pub(super) fn miss(&mut self, missed: f32) {
+        if missed > 0.0 {
+            self.error = (self.error * self.error + missed * missed).sqrt();
+        }
+    }
+}
+
 /// Whether a pixel needs more samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum End {

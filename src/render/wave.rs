@@ -117,6 +117,13 @@ pub(crate) struct Crossing {
     pub beyond: Media,
 }
 
+impl Crossing {
+    /// How many times as far as normals directions turn that go through, when light falls in steeply.
+    pub(crate) fn turns(&self) -> f32 {
+        (1.0 - self.n_i / self.n_t).abs()
+    }
+}
+
 impl Media {
     const CAPACITY: usize = 4;
     /// Index of empty space.

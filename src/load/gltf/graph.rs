@@ -174,7 +174,7 @@ fn check_scenes(root: &Value, parents: &[Option<usize>], report: &mut Report) {
 
 /// The transform of one node, from its matrix or its translation, rotation and scale.
 fn local(i: usize, node: &Value, report: &mut Report) -> Local {
-    let trs = ["translation", "rotation", "scale"].iter().any(|name| node.get(*name).is_some());
+    let trs = ["translation", "rotation", "scale"].iter().any(|name| node.get(name).is_some());
     if let Some(columns) = numbers::<16>(node, "matrix") {
         if trs {
             let text = "a matrix and translation, rotation or scale";

@@ -43,14 +43,18 @@ impl Glare {
         }
         let calm = |light: Vec3| if light.max_element() > cap { light * (cap / light.max_element()) } else { light };
         let beyond = |light: Vec3| light - calm(light);
-        let sum_of = |part: &dyn Fn(Vec3) -> f32| -> f64 {
-            level.each().map(|(light, area)| f64::from(part(light)) * f64::from(area)).sum()
+        // Squares of what is very bright or dim are no single floats.
+        let sum = |light: Vec3| f64::from(light.element_sum());
+        let sum_of = |part: &dyn Fn(Vec3) -> f64| -> f64 {
+            level.each().map(|(light, area)| part(light) * f64::from(area)).sum()
         };
-        let (glare, all) = (sum_of(&|light| beyond(light).element_sum()), sum_of(&Vec3::element_sum));
-        let squares = sum_of(&|light| beyond(light).element_sum().powi(2));
+        let (glare, all) = (sum_of(&|light| sum(beyond(light))), sum_of(&sum));
+        let squares = sum_of(&|light| sum(beyond(light)).powi(2));
         #[expect(clippy::cast_possible_truncation, reason = "an area and a mean")]
-        let (area, calm_mean) =
-            ((glare * glare / squares) as f32, (sum_of(&|light| calm(light).max_element()) / (4.0 * PI)) as f32);
+        let (area, calm_mean) = (
+            (glare * glare / squares) as f32,
+            (sum_of(&|light| f64::from(calm(light).max_element())) / (4.0 * PI)) as f32,
+        );
         (glare > LEAST * all && all.is_finite() && squares.is_finite()).then(|| Self {
             calm: Pyramid::sharp(level.with(calm)),
             chance: Chance::new(level.with(beyond), 0.0),

@@ -55,17 +55,12 @@ impl Sampler<'_> {
 }
 
 impl First {
-    /// Tells the pixels of a tile, of those that are among these, that may have missed a firefly.
-    pub(super) fn each_that_may_miss(
-        &self,
-        fireflies: Option<&Fireflies>,
-        tile: Tile,
-        mut tell: impl FnMut((u32, u32)),
-    ) {
-        let Some(fireflies) = fireflies.filter(|_| !self.by_chance.is_empty()) else { return };
-        for &(part, start) in self.parts.iter().filter(|(part, _)| part.meets(tile)) {
+    /// Tells the pixels of a tile, of those that are among these, whose rays were spread by chance.
+    pub(super) fn each_by_chance(&self, tile: Tile, mut tell: impl FnMut((u32, u32))) {
+        let parts = self.parts.iter().filter(|(part, _)| !self.by_chance.is_empty() && part.meets(tile));
+        for &(part, start) in parts {
             let each = part.places().zip(&self.by_chance[start..]).filter(|&(at, _)| tile.contains(at));
-            each.filter(|&(at, &by_chance)| by_chance && fireflies.at(at) > 0.0).for_each(|(at, _)| tell(at));
+            each.filter(|&(_, &by_chance)| by_chance).for_each(|(at, _)| tell(at));
         }
     }
 

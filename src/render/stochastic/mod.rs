@@ -228,7 +228,14 @@ impl<'a> Sampler<'a> {
         (pixels, done): (&mut Vec<Pixel>, &mut TilePixels),
     ) {
         let mut even = around.even(&self.judge, known);
-        first.iter().for_each(|first| first.each_that_may_miss(self.fireflies, known, |at| even.doubt(around.at(at))));
+        if let Some(fireflies) = self.fireflies {
+            let mut doubt = |at| {
+                if fireflies.at(at) > 0.0 {
+                    even.doubt(around.at(at))
+                }
+            };
+            first.iter().for_each(|first| first.each_by_chance(known, &mut doubt));
+        }
         // Block by block, as rays of pixels near each other run alike.
         for block in known.blocks() {
             for y in block.y0..block.y1 {
@@ -255,6 +262,10 @@ impl<'a> Sampler<'a> {
                 from += columns;
             }
         }
+        if let Some(fireflies) = self.fireflies {
+            let mut miss = |at| done.facts[tile.number(at)].miss(fireflies.missed_at(at));
+            first.iter().for_each(|first| first.each_by_chance(tile, &mut miss));
+        }
         first.iter().for_each(|first| first.put(self.frame, done));
         done.rays = tile.pixels() as u64;
     }
@@ -279,6 +290,7 @@ impl<'a> Sampler<'a> {
             let i = tile.number(pixel.at);
             let (color, veil) = pixel.sum().resolve(frame.background);
             (done.beauty[i], done.facts[i]) = (color, pixel.facts);
+            done.facts[i].miss(pixel.missed);
             done.veil.get_mut(i).into_iter().for_each(|to| *to = veil);
             if let Some(layers) = &pixel.layers {
                 done.layers[i] = layers.pixel(frame.view.eye, frame.view.forward);

@@ -27,6 +27,8 @@ pub(super) struct Pixel {
     brightest: f32,
     /// How bright the fireflies are that it may meet; 0: none.
     pub firefly: f32,
+    /// How much too dark it is by others that it may meet.
+    pub missed: f32,
 }
 
 impl Pixel {
@@ -41,6 +43,7 @@ impl Pixel {
             contrast: 0.0,
             brightest: 0.0,
             firefly: 0.0,
+            missed: 0.0,
         }
     }
 
@@ -61,7 +64,7 @@ impl Pixel {
     /// Expects fireflies that were met near it, if rays of some of these samples were spread by chance.
     pub(super) fn expect(&mut self, fireflies: Option<&Fireflies>, by_chance: &[bool]) {
         if let Some(fireflies) = fireflies.filter(|_| by_chance.contains(&true)) {
-            self.firefly = fireflies.at(self.at);
+            (self.firefly, self.missed) = (fireflies.at(self.at), fireflies.missed_at(self.at));
         }
     }
 
