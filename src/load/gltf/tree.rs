@@ -231,41 +231,29 @@ impl fmt::Display for Value<'_> {
     }
 }
 
-impl Tree for Value<'_> {
-    fn get(&self, name: &str) -> Option<&Self> {
-        Self::get(self, name)
-    }
+macro_rules! tree {
+    ($($tree:ty),*) => {$(
+        impl Tree for $tree {
+            fn get(&self, name: &str) -> Option<&Self> {
+                Self::get(self, name)
+            }
 
-    fn as_array(&self) -> Option<&Vec<Self>> {
-        Self::as_array(self)
-    }
+            fn as_array(&self) -> Option<&Vec<Self>> {
+                Self::as_array(self)
+            }
 
-    fn as_u64(&self) -> Option<u64> {
-        Self::as_u64(self)
-    }
+            fn as_u64(&self) -> Option<u64> {
+                Self::as_u64(self)
+            }
 
-    fn as_f64(&self) -> Option<f64> {
-        Self::as_f64(self)
-    }
+            fn as_f64(&self) -> Option<f64> {
+                Self::as_f64(self)
+            }
+        }
+    )*};
 }
 
-impl Tree for serde_json::Value {
-    fn get(&self, name: &str) -> Option<&Self> {
-        Self::get(self, name)
-    }
-
-    fn as_array(&self) -> Option<&Vec<Self>> {
-        Self::as_array(self)
-    }
-
-    fn as_u64(&self) -> Option<u64> {
-        Self::as_u64(self)
-    }
-
-    fn as_f64(&self) -> Option<f64> {
-        Self::as_f64(self)
-    }
-}
+tree!(Value<'_>, serde_json::Value);
 
 /// Builds values of what a parser finds.
 struct Builder;
