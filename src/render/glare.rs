@@ -10,6 +10,7 @@ use super::branch::{Ground, Point, Rough};
 use super::context::Context;
 use super::draws::Purpose;
 use super::observer::Observer;
+use super::optics::reflect;
 use super::shade::{Lobe, Seen, above};
 use super::wave::{Crossing, Media, RayClass};
 use super::whitted::Tracer;
@@ -95,7 +96,7 @@ fn let_through<G: Ground>(point: &Point<G>, crossing: &Crossing, lobe: &Lobe, di
     from_both_sides(normal, dir, |dir| {
         let facet = if crossing.n_i == crossing.n_t {
             // Thin: as a mirror does, on the other side.
-            lobe.facet_to(view, over(normal, dir))
+            lobe.facet_to(view, reflect(dir, normal))
         } else {
             lobe.facet_through(view, dir, (crossing.n_i, crossing.n_t))
         };
@@ -107,12 +108,7 @@ fn let_through<G: Ground>(point: &Point<G>, crossing: &Crossing, lobe: &Lobe, di
 /// What facets turn to a direction, of which there are two kinds: what some would send to the wrong side of the surface is sent to
 /// the right one instead ([`above`]).
 fn from_both_sides(normal: Vec3, dir: Vec3, turned_to: impl Fn(Vec3) -> Vec3) -> Vec3 {
-    turned_to(dir) + turned_to(over(normal, dir))
-}
-
-/// A direction on the other side of a surface.
-fn over(normal: Vec3, dir: Vec3) -> Vec3 {
-    dir - normal * (2.0 * normal.dot(dir))
+    turned_to(dir) + turned_to(reflect(dir, normal))
 }
 
 impl Lobe {
@@ -141,7 +137,7 @@ impl Lobe {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::optics::{reflect, refract};
+    use crate::render::optics::refract;
     use std::f32::consts::PI;
 
     /// What part of drawn facets sends the view to within 8° of a direction, and what part should by their density.
