@@ -1,8 +1,8 @@
 //! Fireflies: samples far brighter than those beside them, since a ray that was spread by chance met something small.
 //!
 //! A lamp behind frosted glass, or far out of focus, is met by one sample of hundreds. Pixels whose first samples all miss it
-//! agree and look certain, and are darker than they should be by all that it adds. So one sample of a part of the pixels is
-//! traced before the picture, and some more of those that show something bright. Where some of these are fireflies, pixels near them whose own samples are spread by chance are
+//! agree and look certain, and are darker than they should be by all that it adds. So one sample of a part of the pixels, or of a
+//! small picture some of each, is traced before the picture, and some more of those that show something bright. Where some of these are fireflies, pixels near them whose own samples are spread by chance are
 //! not certain before they have met one, too, or so many of their samples have not that it matters little.
 
 use super::by_class::ByClass;
@@ -25,6 +25,8 @@ const STEP: u32 = 2;
 /// To foretell what a picture takes one in so many of these.
 const HINT: u32 = 4;
 const SMALL: u64 = 1 << 16;
+/// Of fewer pixels each is asked for more samples until they are as many, but for no more than so many.
+const MOST: u32 = 16;
 
 /// Of a pixel that shows something bright so many more samples are taken, …
 const AGAIN: u32 = 16;
@@ -99,6 +101,19 @@ impl Asked {
     const NOTHING: Self = Self { light: 0.0, by_chance: false };
 }
 
+fn pixels(width: u32, height: u32) -> u64 {
+    u64::from(width) * u64::from(height)
+}
+
+/// Samples that each pixel that is asked is asked for.
+fn samples(width: u32, height: u32) -> u32 {
+    let samples = SMALL / pixels(width, height).max(1);
+    u32::try_from(samples).map_or(MOST, |samples| samples.clamp(1, MOST))
+}
+
+/// The pixel, and what its sample shows.
+type Answer = ((u32, u32), Asked);
+
 /// How closely a picture is looked at.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Closely {
@@ -111,7 +126,7 @@ pub(super) enum Closely {
 impl Closely {
     /// One in so many columns, and rows, is asked.
     fn step(self, width: u32, height: u32) -> u32 {
-        let step = if u64::from(width) * u64::from(height) > SMALL { STEP } else { 1 };
+        let step = if pixels(width, height) > SMALL { STEP } else { 1 };
         match self {
             Self::All => step,
             Self::Hint => step * HINT,
@@ -142,12 +157,15 @@ pub(super) fn look<P: Observer>(
     }
     let (width, height) = (settings.width, settings.height);
     let step = closely.step(width, height);
-    let question = Question { frame: &Frame::new(context, accel, view, settings), how, step };
-    let asked = Mutex::new(Grid::new(width.div_ceil(step) as usize, height.div_ceil(step) as usize));
+    let samples = samples(width, height);
+    let question = Question { frame: &Frame::new(context, accel, view, settings), how, step, samples };
+    let grid = Grid::new(width.div_ceil(step) as usize, height.div_ceil(step) as usize);
+    let asked = Mutex::new(vec![grid; samples as usize]);
     let work = |tracer: &mut Tracer<_, P>, &tile: &Tile| {
         let answers = question.ask(tracer, tile)?;
-        asked.lock().unwrap_or_else(PoisonError::into_inner).put(&answers, step);
-        Some(answers.len() as u64)
+        let mut asked = asked.lock().unwrap_or_else(PoisonError::into_inner);
+        asked.iter_mut().zip(&answers).for_each(|(grid, answers)| grid.put(answers, step));
+        Some(answers.iter().map(Vec::len).sum::<usize>() as u64)
     };
     let (each, mut counts, complete) = each_tile(context, accel, &tiles(width, height), &Quiet(progress), work);
     let mut rays = each.into_iter().sum();
@@ -156,14 +174,14 @@ pub(super) fn look<P: Observer>(
         return (rays, counts);
     }
     let asked = asked.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let bright = asked.bright(step);
+    let bright: Vec<Bright> = asked.iter().flat_map(|grid| grid.bright(step)).collect();
     let some: Vec<&[Bright]> = bright.chunks(TOGETHER / AGAIN as usize).collect();
     let work = |tracer: &mut Tracer<_, P>, some: &&[Bright]| question.ask_again(tracer, some);
     let (answers, more, complete) = each_tile(context, accel, &some, &Quiet(progress), work);
     counts.extend(more);
     if complete {
         rays += bright.len() as u64 * u64::from(AGAIN);
-        let (rare, told) = (answers.into_iter().flatten().collect(), asked.in_cells((CELL / step) as usize));
+        let (rare, told) = (answers.into_iter().flatten().collect(), in_cells(&asked, (CELL / step) as usize));
         let output = output(how.space, question.frame.background);
         let judge = Certainty::of(question.frame, how, output.as_ref(), context.scene.background);
         let missing = |light, more| judge.grey(light + more) - judge.grey(light);
@@ -193,6 +211,8 @@ struct Question<'a> {
     frame: &'a Frame<'a>,
     how: &'a Stochastic,
     step: u32,
+    /// So many of each pixel.
+    samples: u32,
 }
 
 impl Question<'_> {
@@ -202,21 +222,26 @@ impl Question<'_> {
         if light.is_finite() { light } else { 0.0 }
     }
 
-    /// Asks one pixel of each square of `step` columns and rows of a tile. `None` when cancelled.
-    fn ask<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, tile: Tile) -> Option<Vec<((u32, u32), Asked)>> {
+    /// Asks one pixel of each square of `step` columns and rows of a tile; what their first samples say, their second ones, and
+    /// so on. `None` when cancelled.
+    fn ask<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, tile: Tile) -> Option<Vec<Vec<Answer>>> {
         let is_asked = |(x, y): &(u32, u32)| x % self.step == 0 && y % self.step == 0;
         let (columns, rows): (Vec<u32>, Vec<u32>) = tile.places().filter(is_asked).unzip();
-        Places::default().trace_first(self.frame, self.how, tracer, (&columns, &rows))?;
-        let samples = tracer.samples.iter().zip(&tracer.by_chance);
-        let asked = samples.map(|(sample, &by_chance)| Asked { light: self.light(sample), by_chance });
-        Some(columns.into_iter().zip(rows).zip(asked).collect())
+        let mut places = Places::default();
+        let each = (0..self.samples).map(|index| {
+            places.trace_each(self.frame, self.how, tracer, (index, &columns, &rows))?;
+            let samples = tracer.samples.iter().zip(&tracer.by_chance);
+            let asked = samples.map(|(sample, &by_chance)| Asked { light: self.light(sample), by_chance });
+            Some(columns.iter().copied().zip(rows.iter().copied()).zip(asked).collect())
+        });
+        each.collect()
     }
 
     /// Asks some pixels for more samples, and tells which of them show what they did by chance. `None` when cancelled.
     fn ask_again<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, some: &[Bright]) -> Option<Vec<Bright>> {
         let seed = self.frame.settings.seed;
         let wanted = some.iter().flat_map(|&Bright { pixel, .. }| {
-            (1..=AGAIN).map(move |index| Wanted { pixel, key: pixel_key(seed, pixel), index })
+            (self.samples..self.samples + AGAIN).map(move |index| Wanted { pixel, key: pixel_key(seed, pixel), index })
         });
         Places::default().trace(self.frame, self.how, tracer, (Roulette::default(), wanted))?;
         let each = some.iter().zip(tracer.samples.chunks(AGAIN as usize));
@@ -227,7 +252,8 @@ impl Question<'_> {
     }
 }
 
-/// All samples, row by row.
+/// The samples of one index of all pixels that were asked, row by row.
+#[derive(Clone)]
 struct Grid {
     columns: usize,
     rows: usize,
@@ -239,26 +265,10 @@ impl Grid {
         Self { columns, rows, each: vec![Asked::NOTHING; columns * rows] }
     }
 
-    fn put(&mut self, answers: &[((u32, u32), Asked)], step: u32) {
+    fn put(&mut self, answers: &[Answer], step: u32) {
         for &((x, y), asked) in answers {
             self.each[(y / step) as usize * self.columns + (x / step) as usize] = asked;
         }
-    }
-
-    /// What was asked of each cell of so many columns and rows of samples, of what may have met something by chance; and cells in
-    /// a row.
-    fn in_cells(&self, side: usize) -> (Vec<Told>, usize) {
-        let columns = self.columns.div_ceil(side);
-        let mut cells = vec![Told::default(); columns * self.rows.div_ceil(side)];
-        for (y, x) in (0..self.rows).flat_map(|y| (0..self.columns).map(move |x| (y, x))) {
-            let Asked { light, by_chance } = self.each[y * self.columns + x];
-            if by_chance {
-                let cell = &mut cells[y / side * columns + x / side];
-                cell.samples += 1;
-                cell.light += f64::from(light.clamp(0.0, 1.0));
-            }
-        }
-        (cells, columns)
     }
 
     /// The pixels whose samples may be fireflies.
@@ -287,6 +297,25 @@ impl Grid {
     }
 }
 
+/// What was asked of each cell of so many columns and rows of samples, of what may have met something by chance; and cells in a
+/// row.
+fn in_cells(asked: &[Grid], side: usize) -> (Vec<Told>, usize) {
+    let cells = |of: usize| of.div_ceil(side);
+    let (columns, rows) = asked.first().map_or((0, 0), |grid| (cells(grid.columns), cells(grid.rows)));
+    let mut told = vec![Told::default(); columns * rows];
+    for grid in asked {
+        for (y, x) in (0..grid.rows).flat_map(|y| (0..grid.columns).map(move |x| (y, x))) {
+            let Asked { light, by_chance } = grid.each[y * grid.columns + x];
+            if by_chance {
+                let cell = &mut told[y / side * columns + x / side];
+                cell.samples += 1;
+                cell.light += f64::from(light.clamp(0.0, 1.0));
+            }
+        }
+    }
+    (told, columns)
+}
+
 impl Fireflies {
     /// These, in a picture of which the cells were told so much. They matter where without them pixels are too dark by more than
     /// `most`: by how much, is told by how bright these are, and how much more light the fireflies bring on average.
@@ -297,7 +326,7 @@ impl Fireflies {
         most: f32,
     ) -> Self {
         // Threads answer in any order; sums have one.
-        each.sort_unstable_by_key(|bright| bright.pixel);
+        each.sort_unstable_by(|one, other| (one.pixel.cmp(&other.pixel)).then(one.light.total_cmp(&other.light)));
         let (mut told, columns, rows) = (told.clone(), *columns, told.len() / (*columns).max(1));
         for Bright { pixel: (x, y), light } in each {
             let cell = &mut told[(y / CELL) as usize * columns + (x / CELL) as usize];
@@ -364,6 +393,19 @@ mod tests {
         assert!(corner.is_bright(0, 0) && corner.is_bright(4, 4));
         let pixels: Vec<_> = corner.bright(2).iter().map(|bright| bright.pixel).collect();
         assert_eq!(pixels, [(0, 0), (8, 8)]);
+    }
+
+    #[test]
+    fn small_pictures_are_looked_at_with_more_samples_a_pixel() {
+        assert_eq!(
+            [(256, 256), (1024, 768), (128, 256), (64, 64), (9, 5)].map(|(w, h)| samples(w, h)),
+            [1, 1, 2, 16, 16]
+        );
+        let one = |light| Asked { light, by_chance: true };
+        let layer = |light| Grid { columns: 3, rows: 1, each: vec![one(light), one(9.0), Asked::NOTHING] };
+        let (told, columns) = in_cells(&[layer(0.25), layer(0.5)], 2);
+        assert_eq!((columns, told.len()), (2, 2));
+        assert_eq!((told[0].samples, told[0].light, told[1].samples), (4, 2.75, 0));
     }
 
     #[test]

@@ -43,8 +43,8 @@ impl Sampler<'_> {
         }
         let (mut samples, mut by_chance, mut firsts) = (Vec::with_capacity(count), Vec::new(), Vec::new());
         let mut places = Places::default();
-        for some in columns.chunks(TOGETHER).zip(rows.chunks(TOGETHER)) {
-            places.trace_first(self.frame, self.how, tracer, some)?;
+        for (columns, rows) in columns.chunks(TOGETHER).zip(rows.chunks(TOGETHER)) {
+            places.trace_each(self.frame, self.how, tracer, (0, columns, rows))?;
             samples.extend_from_slice(&tracer.samples);
             by_chance.extend_from_slice(&tracer.by_chance);
             firsts.extend_from_slice(&tracer.firsts);

@@ -53,18 +53,18 @@ impl Places {
         self.send(frame, how, roulette, tracer)
     }
 
-    /// The same for the first sample of each of the pixels in these columns and rows.
-    pub(in crate::render) fn trace_first<A: Accel, P: Observer>(
+    /// The same for the sample of this index of each of the pixels in these columns and rows.
+    pub(in crate::render) fn trace_each<A: Accel, P: Observer>(
         &mut self,
         frame: &Frame,
         how: &Stochastic,
         tracer: &mut Tracer<A, P>,
-        (columns, rows): (&[u32], &[u32]),
+        (index, columns, rows): (u32, &[u32], &[u32]),
     ) -> Option<()> {
         self.clear();
         let Self { keys, indices, x, y } = self;
         *keys = pixel_keys(frame.settings.seed, (columns, rows));
-        indices.resize(keys.len(), 0);
+        indices.resize(keys.len(), index);
         x.extend(columns.iter().map(|&column| f64::from(column)));
         y.extend(rows.iter().map(|&row| f64::from(row)));
         self.send(frame, how, Roulette::default(), tracer)
