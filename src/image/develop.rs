@@ -117,7 +117,7 @@ impl<T: Sample, const CHANNELS: usize> Kernel for Row<'_, T, CHANNELS> {
                 let veils: [Channel; 4] =
                     std::array::from_fn(|c| std::array::from_fn(|i| veil.get(i).map_or(0.0, |veil| veil[c])));
                 self.developer.develop_glass(&mut lanes, &veils);
-                put(out, &coded(&lanes));
+                put(out, &coded::<T, CHANNELS>(&lanes));
             }
             return;
         }
@@ -128,7 +128,7 @@ impl<T: Sample, const CHANNELS: usize> Kernel for Row<'_, T, CHANNELS> {
                 last[..pixels.len()].copy_from_slice(pixels);
                 let mut lanes = columns(s, &last);
                 self.developer.develop(&mut lanes);
-                last_coded = coded(&lanes);
+                last_coded = coded::<T, CHANNELS>(&lanes);
             }
             put(out, &last_coded);
         }
@@ -148,10 +148,11 @@ fn columns<S: Simd>(s: S, pixels: &[[f32; 4]]) -> [Channel; 4] {
     columns
 }
 
-/// Codes of display light and coverage.
+/// Codes of display light and, if that is wanted, of coverage.
 #[inline(always)]
-fn coded<T: Sample>([r, g, b, coverage]: &[Channel; 4]) -> [[T; TOGETHER]; 4] {
-    [T::codes(r), T::codes(g), T::codes(b), coverage.map(T::alpha)]
+fn coded<T: Sample, const CHANNELS: usize>([r, g, b, coverage]: &[Channel; 4]) -> [[T; TOGETHER]; 4] {
+    let alpha = if CHANNELS == 4 { coverage.map(T::alpha) } else { [T::MAX; TOGETHER] };
+    [T::codes(r), T::codes(g), T::codes(b), alpha]
 }
 
 /// The steps for one pixel.
@@ -226,19 +227,19 @@ impl<'a> Developer<'a> {
             (light[0][i], light[1][i], light[2][i]) = (r[i] * scale, g[i] * scale, b[i] * scale);
         }
         self.output.tone_map.map_lanes(&mut light);
-        let behind = self.output.background;
-        for (c, channel) in [r, g, b].into_iter().enumerate() {
-            for i in 0..N {
-                channel[i] = match behind {
-                    None if coverage[i] > 0.0 => light[c][i],
-                    None => 0.0,
-                    Some(behind) => light[c][i] * weight[i] + behind[c] * (1.0 - coverage[i]),
-                };
+        // No branch in the loops, so that they become lanes.
+        let Some(behind) = self.output.background else {
+            let covered = *coverage;
+            for (channel, light) in [r, g, b].into_iter().zip(&light) {
+                *channel = std::array::from_fn(|i| if covered[i] > 0.0 { light[i] } else { 0.0 });
             }
+            return;
+        };
+        let clear = coverage.map(|coverage| 1.0 - coverage);
+        for ((channel, light), behind) in [r, g, b].into_iter().zip(&light).zip(behind) {
+            *channel = std::array::from_fn(|i| light[i] * weight[i] + behind * clear[i]);
         }
-        if behind.is_some() {
-            *coverage = [1.0; N];
-        }
+        *coverage = [1.0; N];
     }
 
     /// The same where glass stands before the background. What is seen of a surface that covers a part of a pixel is developed as

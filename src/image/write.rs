@@ -70,14 +70,19 @@ const LINKS: usize = 40;
 
 /// The number under which the process has open what a path leads to, where that is how it is named.
 fn descriptor(path: &Path) -> Option<u32> {
-    let own = fs::canonicalize("/proc/self/fd").ok()?;
     let mut target = path.to_owned();
     for _ in 0..LINKS {
-        let folder = fs::canonicalize(folder_of(&target)).ok()?;
-        if folder == own {
-            return target.file_name()?.to_str()?.parse().ok();
+        let number = target.file_name().and_then(|name| name.to_str()?.parse().ok());
+        let next = fs::read_link(&target).ok();
+        // Most paths are none, and the system need not be asked more.
+        if number.is_none() && next.is_none() {
+            return None;
         }
-        target = folder.join(fs::read_link(&target).ok()?);
+        let folder = fs::canonicalize(folder_of(&target)).ok()?;
+        if folder == fs::canonicalize("/proc/self/fd").ok()? {
+            return number;
+        }
+        target = folder.join(next?);
     }
     None
 }

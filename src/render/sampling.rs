@@ -248,7 +248,12 @@ impl Sampled {
         if let Some(estimate) = self.targeted.and_then(|targeted| targeted.estimate) {
             return Some(estimate);
         }
-        let sum: f64 = self.errors.iter().map(|&e| f64::from(e) * f64::from(e)).sum();
+        // Sums side by side, none of which waits for another.
+        let mut sums = [0.0; 8];
+        for errors in self.errors.chunks(sums.len()) {
+            sums.iter_mut().zip(errors).for_each(|(sum, &error)| *sum += f64::from(error) * f64::from(error));
+        }
+        let sum: f64 = sums.iter().sum();
         (!self.errors.is_empty()).then(|| (sum / self.errors.len() as f64).sqrt())
     }
 }

@@ -17,7 +17,6 @@ use super::{Progress, Settings, adaptive, stochastic};
 use crate::accel::Accel;
 use crate::image::{Channel, Layers, Picture, Values};
 use crate::stopwatch::{Spent, Stopwatch};
-use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -179,18 +178,19 @@ impl Whole {
     fn keep(&mut self, pixels: &TilePixels) {
         let Self { picture, sampled } = self;
         let (width, mut from) = (picture.width as usize, 0);
-        sampled.rays += pixels.rays;
+        sampled.count(pixels);
         for block in pixels.tile.blocks() {
             let count = (block.x1 - block.x0) as usize;
             for y in block.y0..block.y1 {
                 let start = y as usize * width + block.x0 as usize;
                 let (to, own) = (start..start + count, from..from + count);
-                picture.beauty[to.clone()].copy_from_slice(&pixels.beauty[own.clone()]);
+                put_row(&mut picture.beauty[to.clone()], &pixels.beauty[own.clone()], |&color| color);
                 if let Some(veil) = picture.veil.get_mut(to.clone()) {
-                    veil.copy_from_slice(&pixels.veil[own.clone()]);
+                    put_row(veil, &pixels.veil[own.clone()], |&veil| veil);
                 }
                 if let Some(facts) = pixels.facts.get(own.clone()) {
-                    sampled.keep(to, facts);
+                    put_row(&mut sampled.counts[to.clone()], facts, |facts| facts.count);
+                    sampled.errors.get_mut(to).into_iter().for_each(|to| put_row(to, facts, |facts| facts.error));
                 }
                 if let Some(layers) = &mut picture.layers {
                     (start..).zip(&pixels.layers[own]).for_each(|(i, pixel)| pixel.store(layers, i));
@@ -202,20 +202,25 @@ impl Whole {
 }
 
 impl Sampled {
-    /// Keeps how the sampling of pixels that follow each other went, in the places of this range.
-    #[inline(always)]
-    fn keep(&mut self, to: Range<usize>, facts: &[PixelFacts]) {
-        let (mut met, mut at_most, mut spare) = (0, 0, 0);
-        for (count, facts) in self.counts[to.clone()].iter_mut().zip(facts) {
-            *count = facts.count;
-            met += u64::from(facts.end == End::Met);
-            at_most += u64::from(facts.end == End::Open);
-            spare += u64::from(facts.spare);
+    /// Adds the rays of a tile, and how many of its pixels ended how.
+    fn count(&mut self, pixels: &TilePixels) {
+        self.rays += pixels.rays;
+        for facts in &pixels.facts {
+            self.met += u64::from(facts.end == End::Met);
+            self.at_most += u64::from(facts.end == End::Open);
+            self.spare += u64::from(facts.spare);
         }
-        if let Some(errors) = self.errors.get_mut(to) {
-            errors.iter_mut().zip(facts).for_each(|(error, facts)| *error = facts.error);
-        }
-        (self.met, self.at_most, self.spare) = (self.met + met, self.at_most + at_most, self.spare + spare);
+    }
+}
+
+/// Puts something of each pixel of a row of a block into its place; of a whole row without a loop.
+#[inline(always)]
+pub(super) fn put_row<F, T>(to: &mut [T], from: &[F], of: impl Fn(&F) -> T) {
+    const SIDE: usize = BLOCK as usize;
+    if let (Ok(to), Ok(from)) = (<&mut [T; SIDE]>::try_from(&mut *to), <&[F; SIDE]>::try_from(from)) {
+        *to = from.each_ref().map(of);
+    } else {
+        to.iter_mut().zip(from).for_each(|(to, from)| *to = of(from));
     }
 }
 

@@ -166,8 +166,8 @@ impl Resolver {
         };
         let named = if folder.is_none() && base == current() { PathBuf::new() } else { base.clone() };
         let base = base.canonicalize().unwrap_or(base);
-        let root = options.root.clone().unwrap_or_else(|| base.clone());
-        let root = root.canonicalize().unwrap_or(root);
+        let whole = |root: &PathBuf| root.canonicalize().unwrap_or_else(|_| root.clone());
+        let root = options.root.as_ref().map_or_else(|| base.clone(), whole);
         let mut resolver = Self {
             from_stdin: source.is_stdin(),
             base,

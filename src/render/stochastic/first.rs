@@ -113,20 +113,39 @@ impl First {
     }
 }
 
-/// Copies a rectangle of numbers between arrays with so many to a row.
+/// Copies a rectangle of a block's numbers between arrays with so many to a row.
 #[inline(always)]
 fn copy((to, to_step): (&mut [f32], usize), (from, from_step): (&[f32], usize), [width, height]: [usize; 2]) {
-    /// Columns and rows of a whole block.
+    /// Columns and rows of a whole block, and columns of one at the border of what is seen around a tile.
     const SIDE: usize = BLOCK as usize;
-    // The usual size, without a call.
-    if let ([SIDE, SIDE], SIDE, Some(from)) = ([width, height], from_step, from.first_chunk::<{ SIDE * SIDE }>()) {
-        for (row, from) in from.as_chunks::<SIDE>().0.iter().enumerate() {
-            let start = row * to_step;
-            to[start..start + SIDE].copy_from_slice(from);
+    const HALF: usize = SIDE / 2;
+    // The usual sizes, without a call.
+    match (width, from_step, from.first_chunk::<{ SIDE * SIDE }>()) {
+        (SIDE, SIDE, Some(from)) if height == SIDE => {
+            for (row, from) in from.as_chunks::<SIDE>().0.iter().enumerate() {
+                let start = row * to_step;
+                to[start..start + SIDE].copy_from_slice(from);
+            }
         }
-        return;
+        (SIDE, ..) => copy_rows::<SIDE>((to, to_step), (from, from_step), height),
+        (HALF, ..) => copy_rows::<HALF>((to, to_step), (from, from_step), height),
+        _ => (0..height).for_each(|row| {
+            to[row * to_step..][..width].copy_from_slice(&from[row * from_step..][..width]);
+        }),
     }
+}
+
+/// The same of rows so wide.
+#[inline(always)]
+fn copy_rows<const WIDTH: usize>(
+    (to, to_step): (&mut [f32], usize),
+    (from, from_step): (&[f32], usize),
+    height: usize,
+) {
     for row in 0..height {
-        to[row * to_step..][..width].copy_from_slice(&from[row * from_step..][..width]);
+        let (to, from) = (to[row * to_step..].first_chunk_mut(), from[row * from_step..].first_chunk::<WIDTH>());
+        if let (Some(to), Some(from)) = (to, from) {
+            *to = *from;
+        }
     }
 }

@@ -22,7 +22,7 @@ use super::layers::LayerPixel;
 use super::observer::Observer;
 use super::roulette::Roulette;
 use super::sampling::Stochastic;
-use super::tile::{End, PixelFacts, TOGETHER, Tile, TilePixels};
+use super::tile::{End, PixelFacts, TOGETHER, Tile, TilePixels, put_row};
 use super::whitted::Tracer;
 use crate::accel::Accel;
 use crate::image::Output;
@@ -256,9 +256,8 @@ impl<'a> Sampler<'a> {
             let columns = (block.x1 - block.x0) as usize;
             for y in block.y0..block.y1 {
                 let errors = even.errors(around.at((block.x0, y)), columns);
-                for (facts, &error) in done.facts[from..from + columns].iter_mut().zip(errors) {
-                    *facts = PixelFacts { count: 1, spare: 0, error, end: End::Met };
-                }
+                let met = |&error: &f32| PixelFacts { count: 1, spare: 0, error, end: End::Met };
+                put_row(&mut done.facts[from..from + columns], errors, met);
                 from += columns;
             }
         }
