@@ -4,6 +4,7 @@
 //! with `libm`, so the same linear value has the same code on every machine. Most 8-bit codes need none: a polynomial is exact
 //! enough to be sure of them, and thresholds decide the others.
 
+use crate::math::formula::WHOLE;
 use std::sync::LazyLock;
 
 /// Coded value (0..=1) of linear light (0..=1).
@@ -141,12 +142,10 @@ pub(super) fn curve(linear: f32) -> f32 {
 pub(super) fn encode8_lanes<const N: usize>(linear: &[f32; N]) -> [u8; N] {
     /// What the curve may be off by, in codes, and the rounding of a product: 255 · (6·10⁻⁷ + 2⁻²³), and some room.
     const OFF: f32 = 3e-4;
-    /// Of numbers from here to twice as many the lowest bits are whole: a sum with it is rounded to these. Compilers make no lanes
-    /// of a cast.
-    const WHOLE: f32 = 8_388_608.0;
     let mut codes = [0; N];
     let mut unsure = 0;
     for i in 0..N {
+        // The nearest code without a cast, of which compilers make no lanes.
         let code = 255.0 * curve(linear[i]);
         let rounded = code + WHOLE;
         unsure |= u32::from((code - (rounded - WHOLE)).abs() > 0.5 - OFF);

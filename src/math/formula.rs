@@ -3,15 +3,26 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-/// The greatest whole number that is not above `x`, which is no NaN, without the library call that x86-64 needs
-/// for it before SSE4.1.
+/// Numbers from here on are whole: what is added to it is rounded to these.
+pub const WHOLE: f32 = 8_388_608.0;
+
+/// The greatest whole number that is not above `x`, without the library call that x86-64 needs for it before SSE4.1, and without
+/// casts, of which compilers make no lanes.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "within ±2²³ both casts are exact")]
 pub fn floor(x: f32) -> f32 {
-    let truncated = x as i32 as f32;
-    let below = if truncated > x { truncated - 1.0 } else { truncated };
-    // Larger numbers are whole.
-    if x.abs() >= 8_388_608.0 { x } else { below }
+    let whole = WHOLE.copysign(x);
+    let nearest = (x + whole) - whole;
+    let below = if nearest > x { nearest - 1.0 } else { nearest };
+    if x.abs() < WHOLE { below } else { x }
+}
+
+/// A whole number within ±2³¹ as such.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "the lowest bits are the number")]
+pub fn integer(x: f32) -> i32 {
+    /// 1.5 · 2⁵²: around it numbers are whole.
+    const WHOLE: f64 = 6_755_399_441_055_744.0;
+    (f64::from(x) + WHOLE).to_bits() as i32
 }
 
 /// 0 up to `from`, 1 from `to` on, and as smooth as a cubic can be between.
@@ -62,7 +73,6 @@ pub fn log2(x: f32) -> f32 {
 
 /// The power of two of `x`, −126 … 127, to 2e-7 of it; exact for whole numbers.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "an exponent")]
 pub fn exp2(x: f32) -> f32 {
     /// Of f in its powers, (2ᶠ − 1 − f) / (f (f − 1)): fitted to 0 ≤ f ≤ 1 for the least error of the power.
     const FIT: [f32; 4] = [0.306_848_26, 0.066_688_99, 0.010_870_314, 0.001_879_318_6];
@@ -70,7 +80,7 @@ pub fn exp2(x: f32) -> f32 {
     let f = x - whole;
     let [first @ .., last] = FIT;
     let part = 1.0 + (f + f * (f - 1.0) * first.iter().rev().fold(last, |sum, c| sum * f + c));
-    f32::from_bits((whole as i32 + 127).cast_unsigned() << 23) * part
+    f32::from_bits((integer(whole) + 127).cast_unsigned() << 23) * part
 }
 
 /// `x` ≥ 0 to the power of `exponent`, 0 … 1, to 5e-6 of it between 2⁻⁶⁰ and 2⁶⁰ and 7e-6 beyond.
@@ -89,13 +99,13 @@ pub fn power(x: f32, exponent: f32) -> f32 {
 
 /// Sine and cosine of so many full turns, 0 ≤ `turns` ≤ 1, to 2e-7.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "a number of eighths of a turn")]
 pub fn sin_cos_of_turns(turns: f32) -> (f32, f32) {
     /// Of r² in its powers, the sine of r turns over r and its cosine: fitted to −⅛ ≤ r ≤ ⅛ for the least error at worst.
     const SINE: [f32; 4] = [6.283_185_5, -41.341_63, 81.588_13, -75.240_07];
     const COSINE: [f32; 5] = [1.0, -19.739_208, 64.939_316, -85.442_856, 59.220_406];
-    let quarter = (turns * 4.0 + 0.5) as i32;
-    let r = turns - quarter as f32 * 0.25;
+    let quarter = floor(turns * 4.0 + 0.5);
+    let r = turns - quarter * 0.25;
+    let quarter = integer(quarter);
     let squared = r * r;
     let sum = |fit: &[f32]| fit.iter().rev().fold(0.0, |sum, c| sum * squared + c);
     let (sine, cosine) = (r * sum(&SINE), sum(&COSINE));
@@ -119,6 +129,17 @@ mod tests {
         let infinite = [f32::INFINITY, f32::NEG_INFINITY];
         for x in some.into_iter().chain(infinite) {
             assert_eq!(floor(x), x.floor(), "{x}");
+        }
+        for bits in (0..u32::MAX).step_by(65_521) {
+            let x = f32::from_bits(bits);
+            assert!(floor(x) == x.floor() || x.is_nan(), "{x}");
+        }
+    }
+
+    #[test]
+    fn whole_numbers_become_integers() {
+        for x in [0, 1, -1, 7, -8, 65_537, 8_388_607, -8_388_608, 16_777_215, -16_777_216, 2_147_483_520, i32::MIN] {
+            assert_eq!(integer(x as f32), x);
         }
     }
 

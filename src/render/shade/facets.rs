@@ -2,6 +2,7 @@
 //! several bounces between them ([`rebound`]).
 
 use crate::math::Vec3;
+use crate::math::formula::{floor, integer};
 use crate::math::simd::{LANES, Row as Eight, Simd};
 
 /// Directional albedo of the microfacet lobe as (scale of f0, scale of f90), the split sum of B. Karis, "Real Shading in
@@ -176,11 +177,11 @@ impl AlbedoRow {
 
 /// The column of [`ALBEDO`] before this N·V, but for the last, and how far behind it that is.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "0 … 8")]
 fn column(n_v: f32) -> (u32, f32) {
     let x = n_v.clamp(0.0, 1.0).sqrt() * 8.0;
-    let column = (x as u32).min(7);
-    (column, x - column as f32)
+    let column = floor(x);
+    let column = if column < 7.0 { column } else { 7.0 };
+    (integer(column).cast_unsigned(), x - column)
 }
 
 /// Between the two entries that are nearest to N·V.

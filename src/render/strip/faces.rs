@@ -147,13 +147,13 @@ impl Faces {
     /// The colours of the corners.
     #[inline(always)]
     pub(super) fn colors(&self, i: usize) -> [Vec4; 3] {
-        [6, 10, 14].map(|k| four(&self.extras, k, i))
+        [four(&self.extras, 6, i), four(&self.extras, 10, i), four(&self.extras, 14, i)]
     }
 
     /// The tangents of the corners.
     #[inline(always)]
     pub(super) fn tangents(&self, i: usize) -> [Vec4; 3] {
-        [12, 16, 20].map(|k| four(&self.skins, k, i))
+        [four(&self.skins, 12, i), four(&self.skins, 16, i), four(&self.skins, 20, i)]
     }
 
     /// The plane and the rim.
@@ -203,7 +203,8 @@ impl Faces {
     }
 }
 
-/// Four columns from the `k`th on at a point.
+/// Four columns from the `k`th on at a point. Where it is used there are no maps over arrays: they are not always inlined, and then
+/// loops over points do not become lanes.
 #[inline(always)]
 fn four(columns: &[Roomy<f32>], k: usize, i: usize) -> Vec4 {
     Vec4::new(columns[k][i], columns[k + 1][i], columns[k + 2][i], columns[k + 3][i])

@@ -5,7 +5,7 @@
 
 use super::pyramid::{self, Plane, Stored};
 use super::{ColorSpace, PROBES, TextureStore, apart, decode, doublings, pixels, probes, size_of};
-use crate::math::formula::floor;
+use crate::math::formula::{floor, integer};
 use crate::math::simd::LANES;
 use crate::math::{Vec2, Vec4};
 use crate::scene::{Filter, Mipmaps, Sampler, Wrap};
@@ -112,9 +112,9 @@ pub(crate) fn changes(
 fn nearest(c: &Eight, sides: &[u32; LANES], wrap: Wrap) -> [u32; LANES] {
     let (c, mut places) = (periods(c, wrap), [0; LANES]);
     for i in 0..LANES {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "sides are below 2²³")]
-        let at = floor(c[i] * sides[i] as f32) as i32;
-        places[i] = at;
+        #[expect(clippy::cast_precision_loss, reason = "sides are below 2²³")]
+        let place = c[i] * sides[i] as f32;
+        places[i] = integer(floor(place));
     }
     inside(&places, sides, wrap)
 }
@@ -354,9 +354,7 @@ impl Pairs {
             #[expect(clippy::cast_precision_loss, reason = "sides are below 2²³")]
             let place = period[i] * sides[i] as f32 - if MIXED { 0.5 } else { half[i] };
             let whole = floor(place);
-            #[expect(clippy::cast_possible_truncation, reason = "no farther than two sides")]
-            let at = whole as i32;
-            (below[i], share[i]) = (at, if MIXED || half[i] > 0.0 { place - whole } else { 0.0 });
+            (below[i], share[i]) = (integer(whole), if MIXED || half[i] > 0.0 { place - whole } else { 0.0 });
         }
         let near = inside(&below, sides, wrap);
         below.iter_mut().zip(half).for_each(|(at, half)| *at += i32::from(MIXED || *half > 0.0));
@@ -398,9 +396,8 @@ fn again(place: i32, len: i32) -> i32 {
     if up >= len { up - len } else { up }
 }
 
-/// The whole part of what is not negative.
+/// The whole part of a level, which is not negative; there are fewer than 32 levels.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "x is not negative; the cast saturates")]
-fn whole(x: f32) -> u32 {
-    x as u32
+fn whole(lod: f32) -> u32 {
+    integer(floor(lod.min(31.0))).cast_unsigned()
 }
