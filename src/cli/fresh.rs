@@ -1,7 +1,7 @@
 //! `--update`: which pictures are what rendering them would make again.
 //!
-//! A picture that was made with it carries what was asked for, as one hash, and the hash of each file that was read. It is up
-//! to date if all are the same still, whatever the times of the files say. (Other pictures carry nothing of how they were
+//! A picture that was made with it carries what was asked for, and of which program, as one hash, and the hash of each file that was
+//! read. It is up to date if all are the same still, whatever the times of the files say. (Other pictures carry nothing of how they were
 //! asked for: there are several ways to ask for one.)
 
 use super::job::{Batch, RenderJob, Shot};
@@ -12,6 +12,7 @@ use serde_json::{Map, Value};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
 /// Bytes that are read of a file at a time.
@@ -65,8 +66,15 @@ fn carried(shot: &Shot) -> Option<String> {
 fn asked(job: &RenderJob, batch: &Batch, shot: &Shot) -> String {
     let how = (&job.load, &job.look, &job.sequence, job.accel, job.intersector, &job.params, job.instances);
     let which = (&batch.inputs, &shot.choice, &shot.step, shot.kind, job.allow_empty, job.strict);
-    hex(xxh3_128(format!("{}\n{how:?}\n{which:?}", super::version::SHORT).as_bytes()))
+    hex(xxh3_128(format!("{}\n{how:?}\n{which:?}", *PROGRAM).as_bytes()))
 }
+
+/// Which program this is: the hash of its file, since builds of one version may draw differently; its version where it cannot be
+/// read.
+static PROGRAM: LazyLock<String> = LazyLock::new(|| {
+    let hash = std::env::current_exe().and_then(|program| hash_of_file(&program));
+    hash.map_or_else(|_| super::version::SHORT.to_owned(), hex)
+});
 
 fn hash_of_file(path: &Path) -> io::Result<u128> {
     // Opening anything but a plain file could wait for ever.

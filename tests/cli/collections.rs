@@ -118,6 +118,37 @@ fn pictures_that_are_up_to_date_are_left_alone() {
     update(&["--depth", "3"]).says(&["0 pictures of 3 inputs, 3 up to date"]);
 }
 
+/// Builds of one version may draw differently.
+#[cfg(target_os = "linux")]
+#[test]
+fn pictures_of_another_build_are_made_again() {
+    let folder = collection();
+    // By another process: a file that this one had open for writing might be busy when it is run.
+    let copy = |more: &str| {
+        let line = format!("cp '{}' other{more}", env!("CARGO_BIN_EXE_meshray"));
+        assert!(
+            std::process::Command::new("sh")
+                .args(["-c", &line])
+                .current_dir(folder.path(""))
+                .status()
+                .unwrap()
+                .success()
+        );
+    };
+    let update = || {
+        let words = ["render", "all", "-o", "thumbs/", "--update", "--size", "16"];
+        Run::of(assert_cmd::Command::new(folder.path("other")).args(words).current_dir(folder.path(""))).ends(0)
+    };
+    folder
+        .run(&["render", "all", "-o", "thumbs/", "--update", "--size", "16"])
+        .ends(0)
+        .says(&["3 pictures of 3 inputs"]);
+    copy("");
+    update().says(&["0 pictures of 3 inputs, 3 up to date"]);
+    copy(" && printf 1 >> other");
+    update().says(&["3 pictures of 3 inputs, 0 up to date"]);
+}
+
 #[test]
 fn how_a_picture_was_asked_for_is_carried_only_where_it_is_wanted() {
     let folder = Folder::with_cube();

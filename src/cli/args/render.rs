@@ -76,7 +76,7 @@ pub(in crate::cli) struct RenderArgs {
     /// Put all inputs into one scene and one picture
     #[arg(long, help_heading = "Output", hide_short_help = true)]
     pub merge: bool,
-    /// Leave pictures alone that are up to date: made with --update by this version, with the same flags, of the same files
+    /// Leave pictures alone that are up to date: made with --update by this build, with the same flags, of the same files
     ///
     /// Which those are is told by hashes that the picture carries, not by times. Of standard input and of hundreds of files a
     /// picture is made again.
