@@ -131,6 +131,7 @@ pub mod bench;
 pub mod cli;
 pub mod generate;
 pub mod image;
+mod jpeg;
 pub mod load;
 pub mod math;
 pub mod named;

@@ -39,17 +39,18 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// A model that cannot be loaded: trying again helps with more memory where that was all that was missing.
+/// A model that cannot be loaded: trying again helps with more memory where that was all that was missing, and with another root
+/// folder where there was none.
 impl From<&LoadError> for Exit {
     fn from(error: &LoadError) -> Self {
-        // Other files are too large whatever the memory.
-        let of_memory = |fault: &Diagnostic| match fault.code {
+        let is_not_of_the_file = |fault: &Diagnostic| match fault.code {
+            // Other files are too large whatever the memory.
             "file-too-large" => fault.remedy == RAISE_MEMORY,
-            code => code == OVER_MEMORY,
+            code => code == OVER_MEMORY || code == "root-missing",
         };
         match error {
             LoadError::Read { .. } => Self::Failed,
-            LoadError::Input(faults) if !faults.is_empty() && faults.iter().all(of_memory) => Self::Failed,
+            LoadError::Input(faults) if !faults.is_empty() && faults.iter().all(is_not_of_the_file) => Self::Failed,
             LoadError::Input(_) => Self::Input,
         }
     }

@@ -187,10 +187,30 @@ pub(super) fn too_large_to_judge((width, height): (u32, u32), limit: u64) -> Opt
 }
 
 fn beyond((width, height): (u32, u32), need: u64, limit: u64) -> Option<Diagnostic> {
-    (need > limit).then(|| {
-        let text = format!("a {width}×{height} picture needs {need} bytes where {limit} are allowed");
-        Diagnostic::new("picture-too-large", "", "", text).remedy("choose a smaller --size or raise --max-memory")
-    })
+    let (why, remedy) = if need > limit {
+        (format!("where {limit} are allowed"), "choose a smaller --size or raise --max-memory")
+    } else if !is_given(need) {
+        ("which this machine does not have".to_owned(), "choose a smaller --size")
+    } else {
+        return None;
+    };
+    let text = format!("a {width}×{height} picture needs {need} bytes {why}");
+    Some(Diagnostic::new("picture-too-large", "", "", text).remedy(remedy))
+}
+
+/// Whether the system gives so much memory at once; nothing of it is touched. Where it does not, the program would be ended in
+/// the midst of its work.
+fn is_given(need: u64) -> bool {
+    /// Every system gives this much.
+    const LITTLE: u64 = 1 << 30;
+    let is_reserved = |need: usize| {
+        let mut room = Vec::<u8>::new();
+        let reserved = room.try_reserve_exact(need).is_ok();
+        // Else the compiler may do without it.
+        std::hint::black_box(room);
+        reserved
+    };
+    need <= LITTLE || usize::try_from(need).is_ok_and(is_reserved)
 }
 
 /// Why a picture was not written.
@@ -243,6 +263,16 @@ mod tests {
     use super::*;
     use crate::math::DVec3;
     use crate::scene::{Material, Phong, Reflection, RenderHints, Sphere};
+
+    #[test]
+    fn pictures_that_no_machine_has_room_for_are_refused_before_they_are_begun() {
+        assert!(is_given(1 << 20) && !is_given(1 << 60));
+        let limit = u64::MAX;
+        assert!(beyond((1024, 768), 1 << 26, limit).is_none());
+        let fault = beyond((65_535, 65_535), 1 << 60, limit).unwrap();
+        assert!(fault.text.ends_with("bytes which this machine does not have"), "{}", fault.text);
+        assert_eq!(fault.remedy, "choose a smaller --size");
+    }
 
     #[test]
     fn the_command_line_overrides_the_scene_file_which_overrides_the_defaults() {

@@ -2,6 +2,7 @@
 
 use super::develop::{Raster, raster};
 use super::{FileKind, ImageError, Metadata, Output, Picture, exif, srgb};
+use crate::jpeg;
 use ::image::codecs::jpeg::JpegEncoder;
 use ::image::codecs::webp::WebPEncoder;
 use ::image::metadata::Orientation;
@@ -34,8 +35,13 @@ pub(super) fn encode_webp(picture: &Picture, output: &Output, metadata: &Metadat
     Ok(file)
 }
 
-/// Reads such a file as it is looked at; at most `max_pixels`.
+/// Reads such a file as it is looked at; at most `max_pixels`. A JPEG that was cut off is refused: what is missing would be shown
+/// as something.
 pub(super) fn decode(bytes: &[u8], kind: FileKind, max_pixels: u64) -> Result<Picture, ImageError> {
+    if kind == FileKind::Jpeg && jpeg::is_cut_off(bytes) {
+        let reason = format!("its {} bytes have no end; it was cut off", bytes.len());
+        return Err(ImageError::decode(kind, reason));
+    }
     let fail = |e: ::image::ImageError| ImageError::decode(kind, e);
     let format = if kind == FileKind::Webp { ImageFormat::WebP } else { ImageFormat::Jpeg };
     // Four bytes a pixel; sizes are compared with `max_pixels` before any is read.
@@ -97,6 +103,16 @@ mod tests {
         let back = ::image::load_from_memory_with_format(&bytes, ImageFormat::WebP).unwrap().to_rgba8();
         assert_eq!(back.get_pixel(3, 7).0, [188, 0, 0, 255]);
         assert_eq!(back.get_pixel(60, 7).0, [0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn a_jpeg_that_was_cut_off_is_no_picture_to_compare_with() {
+        let bytes = encode_jpeg(&picture(), &output(), &Metadata::new()).unwrap();
+        assert!(decode(&bytes, FileKind::Jpeg, 1 << 20).is_ok());
+        for length in [bytes.len() / 2, bytes.len() - 1] {
+            let fault = decode(&bytes[..length], FileKind::Jpeg, 1 << 20).unwrap_err().to_string();
+            assert!(fault.ends_with(&format!("its {length} bytes have no end; it was cut off")), "{fault}");
+        }
     }
 
     #[test]

@@ -9,7 +9,6 @@ pub mod diagnostic;
 mod finder;
 mod geometry;
 pub mod gltf;
-mod jpeg;
 mod ktx;
 pub mod limits;
 mod mtl;

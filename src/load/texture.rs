@@ -6,7 +6,8 @@
 
 use super::diagnostic::{CUT_OFF, RAISE_MEMORY};
 use super::limits::{Budget, Limits};
-use super::{Diagnostic, Warnings, jpeg, ktx};
+use super::{Diagnostic, Warnings, ktx};
+use crate::jpeg;
 use crate::pages::Paged;
 use crate::scene::{Bitmap, Pixels};
 use crate::stopwatch::{Spent, Stopwatch};

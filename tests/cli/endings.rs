@@ -136,7 +136,7 @@ fn a_scene_that_cannot_be_written_is_not_made() {
 #[test]
 fn a_root_that_is_not_there_is_told_as_that() {
     let folder = Folder::with_cube();
-    folder.render(&["cube.obj", "--root", "gone"]).ends(3).says(&["gone: there is no such folder", "--root"]);
+    folder.render(&["cube.obj", "--root", "gone"]).ends(1).says(&["gone: there is no such folder", "--root"]);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 /// Whether the data of a JPEG picture has no end (marker EOI; ITU-T T.81, *Digital Compression and Coding of Continuous-Tone
 /// Still Images*, 1992, B.1.1.3).
-pub(super) fn is_cut_off(bytes: &[u8]) -> bool {
+pub(crate) fn is_cut_off(bytes: &[u8]) -> bool {
     /// Start of a scan: behind its header are coded numbers, in which no other marker is but those between parts of them.
     const SOS: u8 = 0xda;
     const EOI: [u8; 2] = [0xff, 0xd9];
