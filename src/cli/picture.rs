@@ -41,6 +41,7 @@ impl Effective {
                 env_rays: look.env_rays,
                 gloss_rays: look.gloss_rays,
                 light_rays: look.light_rays.unwrap_or(usual.light_rays),
+                walls: usual.walls,
                 layers: look.layers,
                 one_by_one: false,
                 everything: false,
@@ -71,8 +72,12 @@ pub(super) fn wide_in_pixels(narrowest: f64, size: f64, settings: &Settings) -> 
 }
 
 impl Effective {
-    /// The same for a picture that is written as this kind of file: errors are counted in what it holds.
-    pub(super) fn written_as(&mut self, look: &Look, kind: FileKind) {
+    /// The same for a picture of a scene that is written as this kind of file: errors are counted in what it holds. Measured lamps
+    /// are shown by exposures of many stops; the walls of the studio, which stand for no place, are not to turn black or white by them.
+    pub(super) fn written_as(&mut self, look: &Look, scene: &Scene, kind: FileKind) {
+        if scene.photometric && kind != FileKind::Exr {
+            self.settings.walls = libm::exp2f(-self.output.exposure);
+        }
         self.settings.sampling = look.sampling.written(self.settings.sampling, kind, &self.output);
     }
 

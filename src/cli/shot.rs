@@ -175,7 +175,7 @@ pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut S
             profile.done("meter");
         }
         times.meter = metered.take_seconds();
-        effective.written_as(&job.look, shot.kind);
+        effective.written_as(&job.look, scene, shot.kind);
         if let Some(narrowest) = loaded.facts.wires.narrowest() {
             effective.of_wires(&job.look, narrowest, 2.0 * bounds.radius());
         }

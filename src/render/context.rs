@@ -141,7 +141,7 @@ impl<'a> Context<'a> {
         let gloss = Gloss::new(settings.gloss_rays).shared_by(together).of_samples(settings);
         let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, gloss.all, settings.cutoff));
         let spreads = depth > 0 && scene.materials.iter().any(|material| gloss.spreads_far(material));
-        let mut sky = Sky::new(scene);
+        let mut sky = Sky::new(scene).before_walls(settings.walls);
         if spreads {
             sky.find_glare();
         }

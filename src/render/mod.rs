@@ -116,6 +116,8 @@ pub struct Settings {
     /// Rays that the first rough surface on a line of sight spreads over what it mirrors, and over what it lets through; 0: rough
     /// surfaces see their surroundings blurred by a formula, and nothing else. `None`: 4 for what lets light through, else 0.
     pub gloss_rays: Option<u32>,
+    /// How many times as bright as they are the walls of the built-in studio are behind everything.
+    pub walls: f32,
     /// Whether [`crate::image::Layers`] are wanted.
     pub layers: bool,
     /// Whether each point of a surface is shaded by itself and none beside others: the same picture, later, to compare.
@@ -156,6 +158,7 @@ impl Default for Settings {
             env_rays: None,
             light_rays: 16,
             gloss_rays: None,
+            walls: 1.0,
             layers: false,
             one_by_one: false,
             everything: false,

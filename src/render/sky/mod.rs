@@ -33,6 +33,8 @@ pub(crate) struct Sky {
     /// Whether what is behind everything looks as the usual tone curve makes it: pictures in which nothing answers to light
     /// have none, and stand before the same walls as others.
     is_toned: bool,
+    /// How many times as bright as they are the walls of the studio are behind everything.
+    walls: f32,
     map: Option<Map>,
 }
 
@@ -57,7 +59,12 @@ impl Sky {
             Map { pyramid, chance, glare: None, turn: libm::sincosf(panorama.rotation) }
         });
         let is_toned = is_unlit(scene);
-        Self { environment: scene.environment, up: scene.up, backdrop, is_toned, map }
+        Self { environment: scene.environment, up: scene.up, backdrop, is_toned, walls: 1.0, map }
+    }
+
+    /// The same with so many times as bright walls behind everything.
+    pub(crate) fn before_walls(self, walls: f32) -> Self {
+        Self { walls, ..self }
     }
 
     /// Whether nothing comes from anywhere.
@@ -104,7 +111,7 @@ impl Sky {
     /// A wall of the studio as it is to look behind everything.
     #[inline(always)]
     fn toned(&self, wall: Vec3) -> Vec3 {
-        if self.is_toned { ToneMap::default().map(wall.to_array()).into() } else { wall }
+        self.walls * if self.is_toned { ToneMap::default().map(wall.to_array()).into() } else { wall }
     }
 
     /// Mean radiance around a mirror direction, as wide as `roughness` (0 … 1) makes it.
@@ -199,6 +206,18 @@ mod tests {
             let steps = along.windows(2).map(|pair| (pair[1] / pair[0] - 1.0).abs());
             assert!(steps.fold(0.0, f32::max) < 0.02, "{dir}");
         }
+    }
+
+    #[test]
+    fn walls_are_as_bright_as_was_asked_behind_everything_and_nowhere_else() {
+        let sky = Sky::new(&Scene { environment: Environment::Studio, ..Scene::default() });
+        let bright = sky.clone().before_walls(8.0);
+        let (dir, columns) = (Vec3::new(0.6, 0.0, 0.8), [[0.6], [0.0], [0.8]]);
+        assert_eq!(bright.behind(dir, 0.0), 8.0 * sky.behind(dir, 0.0));
+        let mut told = Vec3::ZERO;
+        bright.each_behind(&[0], (columns.each_ref().map(|row| &row[..]), &[0.0]), |_, wall| told = wall);
+        assert_eq!(told, bright.behind(dir, 0.0));
+        assert_eq!((bright.radiance(dir, 0.0), bright.diffuse(dir)), (sky.radiance(dir, 0.0), sky.diffuse(dir)));
     }
 
     #[test]
