@@ -32,6 +32,8 @@ pub(super) trait Sample: Copy + Default + Eq + Send + Sync {
     fn codes(linear: &Channel) -> [Self; TOGETHER];
     /// Code of a coverage 0..=1; not on the sRGB curve.
     fn alpha(coverage: f32) -> Self;
+    /// Whether that is the largest.
+    fn is_solid(coverage: f32) -> bool;
 }
 
 impl Sample for u8 {
@@ -44,6 +46,10 @@ impl Sample for u8 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range, and the cast maps NaN to 0")]
     fn alpha(coverage: f32) -> Self {
         (coverage.clamp(0.0, 1.0) * 255.0 + 0.5) as Self
+    }
+    #[inline(always)]
+    fn is_solid(coverage: f32) -> bool {
+        coverage.clamp(0.0, 1.0) * 255.0 + 0.5 >= 255.0
     }
 }
 
@@ -59,12 +65,17 @@ impl Sample for u16 {
     fn alpha(coverage: f32) -> Self {
         (coverage.clamp(0.0, 1.0) * 65_535.0 + 0.5) as Self
     }
+    #[inline(always)]
+    fn is_solid(coverage: f32) -> bool {
+        coverage.clamp(0.0, 1.0) * 65_535.0 + 0.5 >= 65_535.0
+    }
 }
 
 /// Develops a whole picture.
 pub(super) fn raster<T: Sample>(picture: &Picture, output: &Output) -> Raster<T> {
     let width = (picture.width as usize).max(1);
-    let is_opaque = |row: &[[f32; 4]]| row.iter().all(|p| T::alpha(p[3]) == T::MAX);
+    // Without an end before that of the row: these become lanes.
+    let is_opaque = |row: &[[f32; 4]]| row.iter().fold(true, |all, p| all & T::is_solid(p[3]));
     let opaque = output.background.is_some() || picture.beauty.par_chunks(width).all(is_opaque);
     let channels = if opaque { 3 } else { 4 };
     let mut samples = vec![T::default(); picture.beauty.len() * channels];

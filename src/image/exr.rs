@@ -82,12 +82,13 @@ fn channels(picture: &Picture, output: &Output) -> SmallVec<[AnyChannel<FlatSamp
     let ids = |name: &str, values: &[u32]| AnyChannel::new(text(name), FlatSamples::U32(values.to_vec()));
 
     let mut list = SmallVec::new();
-    for (i, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
-        let values = (0..).zip(&picture.beauty).map(|(at, &p)| over(p, output.background, picture.veil.get(at))[i]);
+    let mut beauty = [(); 4].map(|()| Vec::with_capacity(picture.beauty.len()));
+    for (at, &pixel) in picture.beauty.iter().enumerate() {
         // Noise of few rays around nothing falls below it; programs that read pictures take no light for less than none.
-        let values = values.map(|x| if x < 0.0 { 0.0 } else { x });
-        list.push(color(name, values.collect()));
+        let pixel = over(pixel, output.background, picture.veil.get(at)).map(|x| if x < 0.0 { 0.0 } else { x });
+        beauty.iter_mut().zip(pixel).for_each(|(values, x)| values.push(x));
     }
+    list.extend(["R", "G", "B", "A"].into_iter().zip(beauty).map(|(name, values)| color(name, values)));
     let Some(layers) = &picture.layers else { return list };
     let axis = |values: &[[f32; 3]], i: usize| values.iter().map(|v| v[i]).collect::<Vec<f32>>();
     for i in 0..3 {

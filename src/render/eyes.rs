@@ -115,7 +115,7 @@ impl Eye<'_> {
     fn ray(&self, place: Place) -> EyeRay {
         let eye = self.view.primary(place.x, place.y, self.width, self.height);
         self.start(match self.lens {
-            Some(lens) => self.through(lens, eye, place.lens),
+            Some(lens) => self.through(lens, eye, on_disc(place.lens)),
             None => eye,
         })
     }
@@ -126,11 +126,11 @@ impl Eye<'_> {
         perspective && self.lens.is_none() && !self.scene.seen_from(self.view.eye).far
     }
 
-    /// The ray from a point of the lens to where `ray` meets what is in focus.
+    /// The ray from a point of the lens, in its unit disc, to where `ray` meets what is in focus.
     #[inline(always)]
-    fn through(&self, lens: ThinLens, ray: PrimaryRay, at: [f64; 2]) -> PrimaryRay {
+    fn through(&self, lens: ThinLens, ray: PrimaryRay, [x, y]: [f64; 2]) -> PrimaryRay {
         let view = self.view;
-        let [x, y] = on_disc(at).map(|c| c * lens.radius);
+        let (x, y) = (x * lens.radius, y * lens.radius);
         let sharp = ray.dir * (lens.focus / ray.dir.dot(view.forward));
         let aside = view.right * x + view.up * y;
         PrimaryRay { origin: ray.origin + aside, dir: (sharp - aside).normalize(), ..ray }
@@ -390,7 +390,11 @@ impl Kernel for Aim<'_> {
                 }
             }
             (_, None) => run.each(&eye, |ray, _| eye.start(ray)),
-            (_, Some(lens)) => run.each(&eye, |ray, at| eye.start(eye.through(lens, ray, at))),
+            (_, Some(lens)) => {
+                // By themselves, as they are no formula: the others become lanes.
+                run.lens[..run.count.min(RUN)].iter_mut().for_each(|at| *at = on_disc(*at));
+                run.each(&eye, |ray, at| eye.start(eye.through(lens, ray, at)));
+            }
         }
         run.write_rays(s, rays, columns, sample);
     }

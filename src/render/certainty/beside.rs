@@ -381,7 +381,9 @@ impl Certainty<'_> {
         for c in 0..channels {
             let (mut sum, mut squares) = ([0.0; PIXELS], [0.0; PIXELS]);
             for rows in left {
-                (0..PIXELS).for_each(|i| sum[i] += f64::from(rows[c][i]));
+                for i in 0..PIXELS {
+                    sum[i] += f64::from(rows[c][i]);
+                }
             }
             for rows in left {
                 for i in 0..PIXELS {
@@ -389,7 +391,9 @@ impl Certainty<'_> {
                     squares[i] += off * off;
                 }
             }
-            (0..PIXELS).for_each(|i| all[i] += squares[i] * (n - 1.0) / n);
+            for i in 0..PIXELS {
+                all[i] += squares[i] * (n - 1.0) / n;
+            }
         }
         for i in 0..PIXELS {
             let error = (all[i] / channels as f64).sqrt() as f32;

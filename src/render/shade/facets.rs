@@ -128,11 +128,10 @@ fn mix(a: (f32, f32), b: (f32, f32), t: f32) -> (f32, f32) {
 }
 
 impl Row {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lies in 0 … 8")]
+    #[inline(always)]
     fn of(roughness: f32) -> Self {
-        let y = roughness.clamp(0.0, 1.0) * 8.0;
-        let row = (y as usize).min(7);
-        Self { row, rest: y - row as f32 }
+        let (row, rest) = row(roughness);
+        Self { row: row as usize, rest }
     }
 
     fn entry(self, column: usize) -> (f32, f32) {
@@ -175,13 +174,58 @@ impl AlbedoRow {
     }
 }
 
-/// The column of [`ALBEDO`] before this N·V, but for the last, and how far behind it that is.
+/// Of each square between entries of [`ALBEDO`], row by row, those at its corners: left and right in the upper row, and in the
+/// lower one.
+const SQUARES: [[[f32; 4]; 2]; 64] = {
+    let (mut squares, mut i) = ([[[0.0; 4]; 2]; 64], 0);
+    while i < 128 {
+        let (square, lower) = (i / 2, i % 2);
+        let (left, right) = (ALBEDO[square / 8 + lower][square % 8], ALBEDO[square / 8 + lower][square % 8 + 1]);
+        squares[square][lower] = [left.0, left.1, right.0, right.1];
+        i += 1;
+    }
+    squares
+};
+
+/// [`albedo`] at each of eight roughnesses and N·V.
+#[inline(always)]
+pub(crate) fn albedo_of_each<S: Simd>(s: S, roughness: &Eight, n_v: &Eight) -> [Eight; 2] {
+    let (mut squares, mut down, mut across) = ([0; LANES], [0.0; LANES], [0.0; LANES]);
+    for i in 0..LANES {
+        let ((row, below), (column, behind)) = (row(roughness[i]), column(n_v[i]));
+        (squares[i], down[i], across[i]) = (8 * row + column, below, behind);
+    }
+    let corners = |lower: usize| s.columns(squares.each_ref().map(|&square| &SQUARES[square as usize % 64][lower]));
+    let (upper, lower) = (corners(0).map(|lanes| s.store(lanes)), corners(1).map(|lanes| s.store(lanes)));
+    let mut found = [[0.0; LANES]; 2];
+    for (k, found) in found.iter_mut().enumerate() {
+        for i in 0..LANES {
+            let left = upper[k][i] + (lower[k][i] - upper[k][i]) * down[i];
+            let right = upper[k + 2][i] + (lower[k + 2][i] - upper[k + 2][i]) * down[i];
+            found[i] = left + (right - left) * across[i];
+        }
+    }
+    found
+}
+
+/// The row of [`ALBEDO`] before this roughness, but for the last, and how far behind it that is.
+#[inline(always)]
+fn row(roughness: f32) -> (u32, f32) {
+    before(roughness.clamp(0.0, 1.0) * 8.0)
+}
+
+/// The same column of this N·V.
 #[inline(always)]
 fn column(n_v: f32) -> (u32, f32) {
-    let x = n_v.clamp(0.0, 1.0).sqrt() * 8.0;
-    let column = floor(x);
-    let column = if column < 7.0 { column } else { 7.0 };
-    (integer(column).cast_unsigned(), x - column)
+    before(n_v.clamp(0.0, 1.0).sqrt() * 8.0)
+}
+
+/// The whole number before `x`, 0 … 8, at most 7, and how far behind it that is.
+#[inline(always)]
+fn before(x: f32) -> (u32, f32) {
+    let whole = floor(x);
+    let whole = if whole < 7.0 { whole } else { 7.0 };
+    (integer(whole).cast_unsigned(), x - whole)
 }
 
 /// Between the two entries that are nearest to N·V.
@@ -245,6 +289,17 @@ mod tests {
         }
     }
 
+    struct OfEach<'a>(&'a Eight, &'a Eight);
+
+    impl Kernel for OfEach<'_> {
+        type Output = [Eight; 2];
+
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> [Eight; 2] {
+            albedo_of_each(s, self.0, self.1)
+        }
+    }
+
     #[test]
     fn every_instruction_set_finds_the_same_albedos_side_by_side_as_one_by_one() {
         let eights = [
@@ -257,18 +312,22 @@ mod tests {
             for n_v in &eights {
                 let alone = n_v.map(|n_v| albedo(roughness, n_v));
                 for level in Level::all() {
-                    let [scale, bias] = level.run(AtEach(&row, n_v));
-                    let same = |i: usize| {
-                        (scale[i].to_bits(), bias[i].to_bits()) == (alone[i].0.to_bits(), alone[i].1.to_bits())
-                    };
-                    assert!(
-                        (0..LANES).all(same),
-                        "{} {roughness} {n_v:?}: {scale:?} {bias:?}, {alone:?}",
-                        level.name()
-                    );
+                    check(level, level.run(AtEach(&row, n_v)), &alone);
+                    check(level, level.run(OfEach(&[roughness; LANES], n_v)), &alone);
                 }
             }
         }
+        // Each of another roughness.
+        let roughness = [0.0, 0.125, 0.124, 0.5, 0.51, 0.875, 0.999, 1.0];
+        for n_v in &eights {
+            let alone = std::array::from_fn(|i| albedo(roughness[i], n_v[i]));
+            Level::all().into_iter().for_each(|level| check(level, level.run(OfEach(&roughness, n_v)), &alone));
+        }
+    }
+
+    fn check(level: Level, [scale, bias]: [Eight; 2], alone: &[(f32, f32); LANES]) {
+        let same = |i: usize| (scale[i].to_bits(), bias[i].to_bits()) == (alone[i].0.to_bits(), alone[i].1.to_bits());
+        assert!((0..LANES).all(same), "{}: {scale:?} {bias:?}, {alone:?}", level.name());
     }
 
     #[test]

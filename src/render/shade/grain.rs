@@ -139,14 +139,13 @@ impl Kernel for Lean<'_> {
         // Slopes that cut the distribution along one axis, α² / 2 (α² + s²)^³⁄₂, into equal parts.
         let slope = |part: f32| spread * part / (1.0 - part * part).max(f32::MIN_POSITIVE).sqrt();
         let part = |k: usize| (2 * k + 1) as f32 / LOOKUPS as f32 - 1.0;
-        let mut ends = [0.0; LOOKUPS];
-        for (k, end) in ends.iter_mut().enumerate() {
-            *end = atan2(slope(part(k) + 1.0 / LOOKUPS as f32), 1.0);
+        let mut edges = [-PI / 2.0; LOOKUPS + 1];
+        for k in 0..LOOKUPS {
+            edges[k + 1] = atan2(slope(part(k) + 1.0 / LOOKUPS as f32), 1.0);
         }
         for k in 0..LOOKUPS {
             // Wide enough that neighbours meet: a lookup reaches as far as its part of the slopes.
-            let start = if k == 0 { -PI / 2.0 } else { ends[k - 1] };
-            to.blur[k] = narrow.max(ends[k] - start).sqrt();
+            to.blur[k] = narrow.max(edges[k + 1] - edges[k]).sqrt();
             let half = (seen.normal + along * slope(part(k))).normalize_or(seen.normal);
             to.share[k] = half.dot(seen.view).max(0.0);
             let dir = above(reflect(-seen.view, half), seen.geometric);

@@ -17,7 +17,7 @@ mod sheen;
 mod spectrum;
 
 pub(crate) use coat::CoatMatter;
-pub(crate) use facets::{AlbedoRow, albedo, mean_albedo};
+pub(crate) use facets::{AlbedoRow, albedo_of_each, mean_albedo};
 pub(crate) use grain::GrainMatter;
 pub(crate) use highlight::is_narrow;
 pub(crate) use light::{Incident, LocalLight, way};

@@ -2,6 +2,7 @@
 
 use crate::math::Vec3;
 use crate::math::formula::{atan2, floor, log2};
+use crate::math::simd::{self, Kernel, LANES, Simd};
 use crate::scene::Panorama;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -167,17 +168,44 @@ impl Pyramid {
         let cells: Vec<([Vec3; 3], Vec3)> = places.into_par_iter().map(cell).collect();
         let (width, height) = DIFFUSE;
         let table = Level { width, height, texels: Arc::default() };
-        let mean = |normal: &Vec3| {
-            let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
-            for (light, even) in &cells {
-                weights += normal.dot(*even).max(0.0);
-                sum += Vec3::from(light.map(|channel| normal.dot(channel).max(0.0)));
-            }
-            (sum / weights).to_array()
-        };
         let normals: Vec<Vec3> = table.middles().map(|(_, normal)| normal).collect();
-        let texels = normals.par_iter().map(mean).collect();
+        let eights = normals.par_chunks(LANES);
+        let means = eights.flat_map_iter(|normals| {
+            let means = simd::Level::best().run(Means { cells: &cells, normals });
+            means.into_iter().take(normals.len())
+        });
+        let texels = means.collect();
         Level { width, height, texels: Arc::new(texels) }
+    }
+}
+
+/// Cosine-weighted means around eight normals at most, side by side.
+struct Means<'a> {
+    /// Vector integrals of the light of each channel, and of an even light.
+    cells: &'a [([Vec3; 3], Vec3)],
+    normals: &'a [Vec3],
+}
+
+impl Kernel for Means<'_> {
+    type Output = [[f32; 3]; LANES];
+
+    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> [[f32; 3]; LANES] {
+        let (mut x, mut y, mut z) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for (i, normal) in self.normals.iter().enumerate().take(LANES) {
+            (x[i], y[i], z[i]) = (normal.x, normal.y, normal.z);
+        }
+        let (mut sums, mut weights) = ([[0.0_f32; LANES]; 3], [0.0_f32; LANES]);
+        for (light, even) in self.cells {
+            for (sum, of) in sums.iter_mut().zip(light).chain(std::iter::once((&mut weights, even))) {
+                for i in 0..LANES {
+                    let cosine = x[i] * of.x + y[i] * of.y + z[i] * of.z;
+                    sum[i] += if cosine > 0.0 { cosine } else { 0.0 };
+                }
+            }
+        }
+        std::array::from_fn(|i| [sums[0][i] / weights[i], sums[1][i] / weights[i], sums[2][i] / weights[i]])
     }
 }
 

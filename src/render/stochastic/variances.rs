@@ -45,32 +45,34 @@ impl Variances {
 /// Eight numbers in order, the largest first, without a choice on the way (K. E. Batcher, "Sorting Networks and Their
 /// Applications", 1968).
 fn descending(mut numbers: [f32; 8]) -> [f32; 8] {
-    const PAIRS: [(usize, usize); 19] = [
-        (0, 1),
-        (2, 3),
-        (4, 5),
-        (6, 7),
-        (0, 2),
-        (1, 3),
-        (4, 6),
-        (5, 7),
-        (1, 2),
-        (5, 6),
-        (0, 4),
-        (1, 5),
-        (2, 6),
-        (3, 7),
-        (2, 4),
-        (3, 5),
-        (1, 2),
-        (3, 4),
-        (5, 6),
-    ];
-    for (i, j) in PAIRS {
-        let (a, b) = (numbers[i], numbers[j]);
-        (numbers[i], numbers[j]) = if a > b { (a, b) } else { (b, a) };
-    }
+    // Each with its places written down: in a loop over pairs the numbers would stay in memory.
+    order::<0, 1>(&mut numbers);
+    order::<2, 3>(&mut numbers);
+    order::<4, 5>(&mut numbers);
+    order::<6, 7>(&mut numbers);
+    order::<0, 2>(&mut numbers);
+    order::<1, 3>(&mut numbers);
+    order::<4, 6>(&mut numbers);
+    order::<5, 7>(&mut numbers);
+    order::<1, 2>(&mut numbers);
+    order::<5, 6>(&mut numbers);
+    order::<0, 4>(&mut numbers);
+    order::<1, 5>(&mut numbers);
+    order::<2, 6>(&mut numbers);
+    order::<3, 7>(&mut numbers);
+    order::<2, 4>(&mut numbers);
+    order::<3, 5>(&mut numbers);
+    order::<1, 2>(&mut numbers);
+    order::<3, 4>(&mut numbers);
+    order::<5, 6>(&mut numbers);
     numbers
+}
+
+/// Puts the larger one of two numbers first.
+#[inline(always)]
+fn order<const I: usize, const J: usize>(numbers: &mut [f32; 8]) {
+    let (a, b) = (numbers[I], numbers[J]);
+    (numbers[I], numbers[J]) = if a > b { (a, b) } else { (b, a) };
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use super::painted::Painted;
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, LANES, Simd};
 use crate::render::shade::{
-    AlbedoRow, Around, Matter, MetalRoughMatter, Model, PhongMatter, albedo, mean_albedo, open,
+    AlbedoRow, Around, Matter, MetalRoughMatter, Model, PhongMatter, albedo_of_each, mean_albedo, open,
 };
 use crate::render::sky::Sky;
 use crate::render::studio;
@@ -223,9 +223,11 @@ impl MetalRoughPoints for Mapped<'_> {
     }
 
     #[inline(always)]
-    fn find_shares<S: Simd>(&self, _: S, points: usize, n_v: &Column, [scale, bias]: &mut [Column; 2]) {
-        for i in 0..points.min(POINTS) {
-            (scale[i], bias[i]) = albedo(self.painted.roughness[i], n_v[i]);
+    fn find_shares<S: Simd>(&self, s: S, points: usize, n_v: &Column, [scale, bias]: &mut [Column; 2]) {
+        let at = self.painted.roughness.as_chunks().0.iter().zip(n_v.as_chunks().0);
+        let eights = scale.as_chunks_mut().0.iter_mut().zip(bias.as_chunks_mut().0);
+        for ((roughness, n_v), (scale, bias)) in at.zip(eights).take(points.div_ceil(LANES)) {
+            [*scale, *bias] = albedo_of_each(s, roughness, n_v);
         }
     }
 

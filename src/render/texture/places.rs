@@ -286,6 +286,9 @@ impl Places {
             Stored::Bitmap(Texels::Rgb8(texels, colors)) => {
                 self.mean(above, i, |at| decode::solid8(texels[at as usize], colors))
             }
+            Stored::Bitmap(Texels::Rgba8(texels, colors)) => {
+                self.mean(above, i, |at| decode::decode8(texels[at as usize], colors))
+            }
             Stored::Bitmap(texels) => self.mean(above, i, |at| texels.get(at as usize)),
         }
     }

@@ -58,8 +58,16 @@ impl Pyramid {
         }
     }
 
-    /// Level `level` > 0. It depends on the bitmap alone, so it does not matter which thread makes it.
+    /// Level `level` > 0.
+    #[inline]
     fn level(&self, bitmap: &Bitmap, space: ColorSpace, level: usize) -> &Level {
+        self.above[level - 1].get().unwrap_or_else(|| self.made(bitmap, space, level))
+    }
+
+    /// The same, which is made unless another thread is quicker. It depends on the bitmap alone, so it does not matter which.
+    #[cold]
+    #[inline(never)]
+    fn made(&self, bitmap: &Bitmap, space: ColorSpace, level: usize) -> &Level {
         self.above[level - 1].get_or_init(|| {
             let (from, to) = (self.plane(bitmap, space, level - 1), size(bitmap, level));
             let solid = self.is_solid(bitmap, level - 1);
@@ -172,21 +180,18 @@ fn halve_numbers(texels: &[[u8; 3]], width: usize) -> Paged<[u16; 4]> {
     const TWO: u64 = 0x0002_0002_0002_0002;
     const LOW: u64 = 0x3fff_3fff_3fff_3fff;
     let mut halves = Paged::zeroed(texels.len() / 4);
-    // One behind the last: a word has room for four numbers.
-    let mut sums = vec![0_u16; 3 * width + 1];
+    // A texel behind the last: words have room for four numbers.
+    let mut sums = vec![0_u16; 3 * width + 3];
     for (row, rows) in halves.chunks_exact_mut(width / 2).zip(texels.chunks_exact(2 * width)) {
         let (upper, lower) = rows.split_at(width);
         let pairs = upper.as_flattened().iter().zip(lower.as_flattened());
         sums.iter_mut().zip(pairs).for_each(|(sum, (&a, &b))| *sum = u16::from(a) + u16::from(b));
-        for (half, &[a, b, c, d, e, f, g]) in
-            row.iter_mut().zip(sums.windows(7).step_by(6).filter_map(<[u16]>::first_chunk))
-        {
-            let word = |a, b, c, d| u64::from(a) | u64::from(b) << 16 | u64::from(c) << 32 | u64::from(d) << 48;
-            let sum = word(a, b, c, d) + word(d, e, f, g);
+        let (firsts, seconds) = (sums.as_chunks::<6>().0, sums[3..].as_chunks::<6>().0);
+        for ((half, &[a, b, c, d, ..]), &[e, f, g, h, ..]) in row.iter_mut().zip(firsts).zip(seconds) {
+            let sum = word([a, b, c, d]) + word([e, f, g, h]);
             // A quarter of 257 times as many steps, rounded.
             let mean = (sum << 6) + ((sum + TWO) >> 2 & LOW);
-            let solid = mean | u64::from(u16::MAX) << 48;
-            *half = bytemuck::cast::<_, [u16; 4]>(solid.to_le_bytes()).map(u16::from_le);
+            *half = codes_of(mean | u64::from(u16::MAX) << 48);
         }
     }
     halves
@@ -208,12 +213,27 @@ fn rounded(sum: u32) -> u16 {
 }
 
 /// What is stored of the mean of four stored texels whose channels do not weigh each other.
-#[expect(clippy::cast_possible_truncation, reason = "a mean is no larger than the largest")]
 #[inline(always)]
-fn mean_of_codes([a, b, c, d]: [&[u16; 4]; 4]) -> [u16; 4] {
-    let sum = |i: usize| u32::from(a[i]) + u32::from(b[i]) + u32::from(c[i]) + u32::from(d[i]);
-    let mean = |i: usize| ((sum(i) + 2) >> 2) as u16;
-    [mean(0), mean(1), mean(2), mean(3)]
+fn mean_of_codes(four: [&[u16; 4]; 4]) -> [u16; 4] {
+    /// Every other code of a word, with room for a sum of four, and 2 of each.
+    const HALF: u64 = 0x0000_ffff_0000_ffff;
+    const TWO: u64 = 0x0000_0002_0000_0002;
+    let [a, b, c, d] = four.map(|&codes| word(codes));
+    let sum = |shift: u32| (a >> shift & HALF) + (b >> shift & HALF) + (c >> shift & HALF) + (d >> shift & HALF);
+    let mean = |shift: u32| (sum(shift) + TWO) >> 2 & HALF;
+    codes_of(mean(0) | mean(16) << 16)
+}
+
+/// Four codes in a word, the first one lowest.
+#[inline(always)]
+fn word(codes: [u16; 4]) -> u64 {
+    u64::from_le_bytes(bytemuck::cast(codes.map(u16::to_le)))
+}
+
+/// The same the other way round.
+#[inline(always)]
+fn codes_of(word: u64) -> [u16; 4] {
+    bytemuck::cast::<_, [u16; 4]>(word.to_le_bytes()).map(u16::from_le)
 }
 
 /// What [`mean`] gives for four texels of equal shares. No maps over arrays here: they are not always inlined, and this
