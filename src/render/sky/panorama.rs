@@ -189,23 +189,23 @@ struct Means<'a> {
 impl Kernel for Means<'_> {
     type Output = [[f32; 3]; LANES];
 
-    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
     #[inline(always)]
-    fn run<S: Simd>(self, _: S) -> [[f32; 3]; LANES] {
+    fn run<S: Simd>(self, s: S) -> [[f32; 3]; LANES] {
         let (mut x, mut y, mut z) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for (i, normal) in self.normals.iter().enumerate().take(LANES) {
             (x[i], y[i], z[i]) = (normal.x, normal.y, normal.z);
         }
-        let (mut sums, mut weights) = ([[0.0_f32; LANES]; 3], [0.0_f32; LANES]);
-        for (light, even) in self.cells {
-            for (sum, of) in sums.iter_mut().zip(light).chain(std::iter::once((&mut weights, even))) {
-                for i in 0..LANES {
-                    let cosine = x[i] * of.x + y[i] * of.y + z[i] * of.z;
-                    sum[i] += if cosine > 0.0 { cosine } else { 0.0 };
-                }
+        let (x, y, z, zero) = (s.load(&x), s.load(&y), s.load(&z), s.splat(0.0));
+        let mut sums = [zero; 4];
+        for ([red, green, blue], even) in self.cells {
+            for (sum, of) in sums.iter_mut().zip([red, green, blue, even]) {
+                let across = s.add(s.mul(x, s.splat(of.x)), s.mul(y, s.splat(of.y)));
+                *sum = s.add(*sum, s.greater(s.add(across, s.mul(z, s.splat(of.z))), zero));
             }
         }
-        std::array::from_fn(|i| [sums[0][i] / weights[i], sums[1][i] / weights[i], sums[2][i] / weights[i]])
+        let [red, green, blue, even] = sums;
+        let [red, green, blue] = [red, green, blue].map(|sum| s.store(s.div(sum, even)));
+        std::array::from_fn(|i| [red[i], green[i], blue[i]])
     }
 }
 
