@@ -16,6 +16,16 @@ pub fn floor(x: f32) -> f32 {
     if x.abs() < WHOLE { below } else { x }
 }
 
+/// The same for one number by itself, which is no NaN: with casts, which take less time there, and a choice that is mostly the same
+/// for what is not negative.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "within ±2²³ both casts are exact")]
+pub fn floor_of_one(x: f32) -> f32 {
+    let truncated = x as i32 as f32;
+    let below = if truncated > x { truncated - 1.0 } else { truncated };
+    if x.abs() < WHOLE { below } else { x }
+}
+
 /// A whole number within ±2³¹ as such.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "the lowest bits are the number")]
@@ -128,11 +138,11 @@ mod tests {
         let some = [0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 7.999_999_5, -3.000_000_2, 8_388_607.5, -8_388_607.5, 3e9, -3e9];
         let infinite = [f32::INFINITY, f32::NEG_INFINITY];
         for x in some.into_iter().chain(infinite) {
-            assert_eq!(floor(x), x.floor(), "{x}");
+            assert_eq!([floor(x), floor_of_one(x)], [x.floor(); 2], "{x}");
         }
         for bits in (0..u32::MAX).step_by(65_521) {
             let x = f32::from_bits(bits);
-            assert!(floor(x) == x.floor() || x.is_nan(), "{x}");
+            assert!([floor(x), floor_of_one(x)] == [x.floor(); 2] || x.is_nan(), "{x}");
         }
     }
 

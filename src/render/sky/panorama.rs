@@ -1,7 +1,7 @@
 //! A panorama and smaller copies of it, asked for its radiance at any blur.
 
 use crate::math::Vec3;
-use crate::math::formula::{atan2, floor, log2};
+use crate::math::formula::{atan2, floor_of_one, log2};
 use crate::math::simd::{self, Kernel, LANES, Simd};
 use crate::scene::Panorama;
 use rayon::prelude::*;
@@ -289,7 +289,7 @@ impl Level {
     fn at(&self, (x, y): (f32, f32)) -> Vec3 {
         let (width, height) = (self.width.cast_signed(), self.height.cast_signed());
         let (x, y) = (x * self.width as f32 - 0.5, y * self.height as f32 - 0.5);
-        let (left, top) = (floor(x), floor(y));
+        let (left, top) = (floor_of_one(x), floor_of_one(y));
         #[expect(clippy::cast_possible_truncation, reason = "a column and a row, or one before")]
         let (column, row) = (left as i32, top as i32);
         // No more than a turn beyond.

@@ -14,7 +14,7 @@ mod survey;
 pub(crate) use places::{Layout, Places, Spots, changes};
 pub(crate) use survey::{Codes, Survey};
 
-use crate::math::formula::floor;
+use crate::math::formula::floor_of_one;
 use crate::math::{Vec2, Vec4};
 use crate::scene::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Scene, Texture, Wrap};
 use decode::Texels;
@@ -263,7 +263,7 @@ impl<'a> Lookup<'a> {
                 if lower >= top {
                     return Plan::One(self.plane(top), minify);
                 }
-                Plan::Between(self.plane(lower), self.plane(lower + 1), minify, lod - floor(lod))
+                Plan::Between(self.plane(lower), self.plane(lower + 1), minify, lod - floor_of_one(lod))
             }
         }
     }
@@ -403,13 +403,13 @@ impl Axis {
     fn new(c: f32, len: usize, wrap: Wrap, filter: Filter) -> Self {
         let c = if c.is_finite() { c } else { 0.0 };
         let period = match wrap {
-            Wrap::Repeat => c - floor(c),
-            Wrap::Mirror => c - 2.0 * floor(c * 0.5),
+            Wrap::Repeat => c - floor_of_one(c),
+            Wrap::Mirror => c - 2.0 * floor_of_one(c * 0.5),
             Wrap::Clamp => c.clamp(0.0, 1.0),
         };
         let half = if filter == Filter::Linear { 0.5 } else { 0.0 };
         let place = period * pixels((len, 0)).x - half;
-        let below = floor(place);
+        let below = floor_of_one(place);
         let near = signed(below);
         Self { near: wrapped(near, len, wrap), far: wrapped(near + 1, len, wrap), share: place - below }
     }
