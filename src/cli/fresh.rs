@@ -1,8 +1,8 @@
 //! `--update`: which pictures are what rendering them would make again.
 //!
-//! A picture that was made with it carries what was asked for, and of which program, as one hash, and the hash of each file that was
-//! read. It is up to date if all are the same still, whatever the times of the files say. (Other pictures carry nothing of how they were
-//! asked for: there are several ways to ask for one.)
+//! A picture that was made with it carries what was asked for, and of which program, as one hash, and the hash of each file
+//! that was read. It is up to date if all are the same still, whatever the times of the files say. (Other pictures carry
+//! nothing of how they were asked for: there are several ways to ask for one.)
 
 use super::job::{Batch, RenderJob, Shot};
 use crate::image::{Metadata, read_metadata};

@@ -72,8 +72,9 @@ pub(super) fn wide_in_pixels(narrowest: f64, size: f64, settings: &Settings) -> 
 }
 
 impl Effective {
-    /// The same for a picture of a scene that is written as this kind of file: errors are counted in what it holds. Measured lamps
-    /// are shown by exposures of many stops; the walls of the studio, which stand for no place, are not to turn black or white by them.
+    /// The same for a picture of a scene that is written as this kind of file: errors are counted in what it holds. Measured
+    /// lamps are shown by exposures of many stops; the walls of the studio, which stand for no place, are not to turn black or
+    /// white by them.
     pub(super) fn written_as(&mut self, look: &Look, scene: &Scene, kind: FileKind) {
         if scene.photometric && kind != FileKind::Exr {
             self.settings.walls = libm::exp2f(-self.output.exposure);

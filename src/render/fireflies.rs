@@ -2,8 +2,9 @@
 //!
 //! A lamp behind frosted glass, or far out of focus, is met by one sample of hundreds. Pixels whose first samples all miss it
 //! agree and look certain, and are darker than they should be by all that it adds. So one sample of a part of the pixels, or of a
-//! small picture some of each, is traced before the picture, and some more of those that show something bright. Where some of these are fireflies, pixels near them whose own samples are spread by chance are
-//! not certain before they have met one, too, or so many of their samples have not that it matters little.
+//! small picture some of each, is traced before the picture, and some more of those that show something bright. Where some of
+//! these are fireflies, pixels near them whose own samples are spread by chance are not certain before they have met one, too, or
+//! so many of their samples have not that it matters little.
 
 use super::by_class::ByClass;
 use super::certainty::{Certainty, output};

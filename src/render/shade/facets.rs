@@ -195,15 +195,14 @@ pub(crate) fn albedo_of_each<S: Simd>(s: S, roughness: &Eight, n_v: &Eight) -> [
         let ((row, below), (column, behind)) = (row(roughness[i]), column(n_v[i]));
         (squares[i], down[i], across[i]) = (8 * row + column, below, behind);
     }
-    let corners = |lower: usize| s.columns(squares.each_ref().map(|&square| &SQUARES[square as usize % 64][lower]));
-    let (upper, lower) = (corners(0).map(|lanes| s.store(lanes)), corners(1).map(|lanes| s.store(lanes)));
-    let mut found = [[0.0; LANES]; 2];
+    let corners = |i: usize| &SQUARES[squares[i] as usize % SQUARES.len()];
+    let upper = s.columns(std::array::from_fn(|i| &corners(i)[0]));
+    let lower = s.columns(std::array::from_fn(|i| &corners(i)[1]));
+    let (down, across, mut found) = (s.load(&down), s.load(&across), [[0.0; LANES]; 2]);
     for (k, found) in found.iter_mut().enumerate() {
-        for i in 0..LANES {
-            let left = upper[k][i] + (lower[k][i] - upper[k][i]) * down[i];
-            let right = upper[k + 2][i] + (lower[k + 2][i] - upper[k + 2][i]) * down[i];
-            found[i] = left + (right - left) * across[i];
-        }
+        let left = s.add(upper[k], s.mul(s.sub(lower[k], upper[k]), down));
+        let right = s.add(upper[k + 2], s.mul(s.sub(lower[k + 2], upper[k + 2]), down));
+        *found = s.store(s.add(left, s.mul(s.sub(right, left), across)));
     }
     found
 }

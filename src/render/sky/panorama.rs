@@ -203,9 +203,12 @@ impl Kernel for Means<'_> {
                 *sum = s.add(*sum, s.greater(s.add(across, s.mul(z, s.splat(of.z))), zero));
             }
         }
-        let [red, green, blue, even] = sums;
-        let [red, green, blue] = [red, green, blue].map(|sum| s.store(s.div(sum, even)));
-        std::array::from_fn(|i| [red[i], green[i], blue[i]])
+        let mut means = [[0.0; 3]; LANES];
+        for k in 0..3 {
+            let channel = s.store(s.div(sums[k], sums[3]));
+            (0..LANES).for_each(|i| means[i][k] = channel[i]);
+        }
+        means
     }
 }
 

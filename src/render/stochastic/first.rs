@@ -120,13 +120,8 @@ fn copy((to, to_step): (&mut [f32], usize), (from, from_step): (&[f32], usize), 
     const SIDE: usize = BLOCK as usize;
     const HALF: usize = SIDE / 2;
     // The usual sizes, without a call.
-    match (width, from_step, from.first_chunk::<{ SIDE * SIDE }>()) {
-        (SIDE, SIDE, Some(from)) if height == SIDE => {
-            for (row, from) in from.as_chunks::<SIDE>().0.iter().enumerate() {
-                let start = row * to_step;
-                to[start..start + SIDE].copy_from_slice(from);
-            }
-        }
+    match (width, from_step, height) {
+        (SIDE, SIDE, SIDE) => copy_rows::<SIDE>((to, to_step), (from, SIDE), SIDE),
         (SIDE, ..) => copy_rows::<SIDE>((to, to_step), (from, from_step), height),
         (HALF, ..) => copy_rows::<HALF>((to, to_step), (from, from_step), height),
         _ => (0..height).for_each(|row| {
@@ -143,9 +138,6 @@ fn copy_rows<const WIDTH: usize>(
     height: usize,
 ) {
     for row in 0..height {
-        let (to, from) = (to[row * to_step..].first_chunk_mut(), from[row * from_step..].first_chunk::<WIDTH>());
-        if let (Some(to), Some(from)) = (to, from) {
-            *to = *from;
-        }
+        to[row * to_step..][..WIDTH].copy_from_slice(&from[row * from_step..][..WIDTH]);
     }
 }

@@ -203,8 +203,8 @@ impl Faces {
     }
 }
 
-/// Four columns from the `k`th on at a point. Where it is used there are no maps over arrays: they are not always inlined, and then
-/// loops over points do not become lanes.
+/// Four columns from the `k`th on at a point. Where it is used there are no maps over arrays: they are not always inlined,
+/// and then loops over points do not become lanes.
 #[inline(always)]
 fn four(columns: &[Roomy<f32>], k: usize, i: usize) -> Vec4 {
     Vec4::new(columns[k][i], columns[k + 1][i], columns[k + 2][i], columns[k + 3][i])
