@@ -35,6 +35,14 @@ pub fn integer(x: f32) -> i32 {
     (f64::from(x) + WHOLE).to_bits() as i32
 }
 
+/// A whole number within ±2²² as such: two instructions, of lanes as wide as its own.
+#[inline(always)]
+pub fn near_integer(x: f32) -> i32 {
+    /// 1.5 · 2²³: around it numbers are whole.
+    const WHOLE: f32 = 12_582_912.0;
+    (x + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits()).cast_signed()
+}
+
 /// 0 up to `from`, 1 from `to` on, and as smooth as a cubic can be between.
 #[inline(always)]
 pub fn smoothstep(from: f32, to: f32, x: f32) -> f32 {

@@ -10,6 +10,9 @@ use std::f32::consts::PI;
 /// Columns of the finest level that is told apart.
 pub(super) const COLUMNS: u32 = 1024;
 
+/// Of so many chances one is told where to begin to look for the one that a number falls on.
+const GUIDED: usize = 4;
+
 /// Share of the draws that go anywhere, so that what is dark is drawn too.
 pub(super) const EVEN: f64 = 0.1;
 
@@ -17,12 +20,21 @@ pub(super) const EVEN: f64 = 0.1;
 #[derive(Clone, Debug)]
 pub(super) struct Chance {
     level: Level,
-    /// Sums of the chances of rows up to each.
-    rows: Vec<f32>,
-    /// Within each row, sums of the chances of texels up to each.
-    columns: Vec<f32>,
+    rows: Sums,
+    /// Within each row, texels.
+    columns: Vec<Sums>,
+    /// Cosines from the zenith of the upper edges of rows, and of the lower edge of the last.
+    edges: Vec<f32>,
     /// Densities of texels, 1/sr.
     densities: Vec<f32>,
+}
+
+/// Rising sums of the chances of some up to each.
+#[derive(Clone, Debug)]
+struct Sums {
+    up_to: Vec<f32>,
+    /// The first that numbers of each part of their range may fall on, a power of two of them, and the last of all.
+    first: Vec<u32>,
 }
 
 impl Chance {
@@ -37,7 +49,7 @@ impl Chance {
             .collect();
         let whole: f64 = lights.iter().sum();
         let even = if whole > 0.0 { even } else { 1.0 };
-        let (mut rows, mut columns) = (Vec::with_capacity(height), Vec::with_capacity(width * height));
+        let (mut rows, mut columns) = (Vec::with_capacity(height), Vec::with_capacity(height));
         let mut densities = Vec::with_capacity(width * height);
         let mut rows_sum = 0.0;
         for row in 0..height {
@@ -49,15 +61,18 @@ impl Chance {
             let chances: Vec<f64> = chances.collect();
             let sum: f64 = chances.iter().sum();
             let mut up_to = 0.0;
-            for chance in &chances {
+            let part = |chance: &f64| {
                 up_to += if sum > 0.0 { chance / sum } else { 0.0 };
-                columns.push(up_to as f32);
-                densities.push((chance / area) as f32);
-            }
+                up_to as f32
+            };
+            columns.push(Sums::new(chances.iter().map(part).collect()));
+            densities.extend(chances.iter().map(|chance| (chance / area) as f32));
             rows_sum += sum;
             rows.push(rows_sum as f32);
         }
-        Self { level, rows, columns, densities }
+        let edge = |row: u32| libm::cosf(PI * row as f32 / level.height as f32);
+        let edges = (0..=level.height).map(edge).collect();
+        Self { level, rows: Sums::new(rows), columns, edges, densities }
     }
 
     /// Radiance of the texel that a direction in the panorama's frame lies in, and the density of drawing that direction,
@@ -70,24 +85,78 @@ impl Chance {
 
     /// The direction of two numbers from 0 … 1, in the panorama's frame.
     pub(super) fn draw(&self, [u, v]: [f32; 2]) -> Vec3 {
-        let (row, down) = pick(&self.rows, u);
-        let width = self.level.width as usize;
-        let (column, right) = pick(&self.columns[row * width..][..width], v);
+        let (row, down) = self.rows.pick(u);
+        let (column, right) = self.columns[row].pick(v);
         // Evenly by area: by the cosine from the zenith, not by the angle.
-        let edge = |row: usize| libm::cosf(PI * row as f32 / self.level.height as f32);
-        let cosine = edge(row) + (edge(row + 1) - edge(row)) * down;
+        let cosine = self.edges[row] + (self.edges[row + 1] - self.edges[row]) * down;
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-        let (sin, cos) = libm::sincosf(((column as f32 + right) / width as f32 - 0.5) * 2.0 * PI);
+        let (sin, cos) = libm::sincosf(((column as f32 + right) / self.level.width as f32 - 0.5) * 2.0 * PI);
         Vec3::new(sine * cos, cosine, sine * sin)
     }
 }
 
-/// Which part of a rising list of sums `u` falls into, and where in it, 0 … 1.
-fn pick(sums: &[f32], u: f32) -> (usize, f32) {
-    let last = sums.len() - 1;
-    let u = u * sums[last];
-    let i = sums.partition_point(|sum| *sum <= u).min(last);
-    let before = if i == 0 { 0.0 } else { sums[i - 1] };
-    let width = sums[i] - before;
-    (i, if width > 0.0 { ((u - before) / width).clamp(0.0, 1.0) } else { 0.5 })
+impl Sums {
+    /// Of at least one.
+    #[expect(clippy::cast_possible_truncation, reason = "no side of a panorama has more texels")]
+    fn new(up_to: Vec<f32>) -> Self {
+        let last = up_to.len() - 1;
+        let parts = (up_to.len() / GUIDED).next_power_of_two();
+        let mut at = 0;
+        let first = |guide: usize| {
+            let number = guide as f32 / parts as f32 * up_to[last];
+            while at < last && up_to[at] <= number {
+                at += 1;
+            }
+            at as u32
+        };
+        let first = (0..=parts).map(first).collect();
+        Self { up_to, first }
+    }
+
+    /// Which of them a number from 0 … 1 falls on, and where on it, 0 … 1.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "one of the parts")]
+    fn pick(&self, number: f32) -> (usize, f32) {
+        let (sums, last) = (&self.up_to, self.up_to.len() - 1);
+        let parts = self.first.len() - 1;
+        let part = ((number * parts as f32) as usize).min(parts - 1);
+        let within = self.first[part] as usize..self.first[part + 1] as usize;
+        let number = number * sums[last];
+        let i = within.start + sums[within].partition_point(|sum| *sum <= number);
+        let before = if i == 0 { 0.0 } else { sums[i - 1] };
+        let width = sums[i] - before;
+        (i, if width > 0.0 { ((number - before) / width).clamp(0.0, 1.0) } else { 0.5 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Random;
+
+    #[test]
+    fn numbers_fall_on_what_all_sums_say_and_ends_on_ends() {
+        let mut random = Random::new(6);
+        for (count, bright) in [(1, 1.0), (2, 0.0), (7, 300.0), (300, 1.0), (1024, 1e6)] {
+            let mut sum = 0.0;
+            let mut chance = |i: usize| if i == count / 3 { bright } else { (random.unit() - 0.2).max(0.0) };
+            let up_to: Vec<f32> = (0..count)
+                .map(|i| {
+                    sum += chance(i);
+                    sum
+                })
+                .collect();
+            let sums = Sums::new(up_to.clone());
+            let numbers = (0..=1000_u16).map(|k| f32::from(k) / 1000.0);
+            let edges = (0..=1024_u16).flat_map(|k| {
+                let at = f32::from(k) / 1024.0;
+                [at.next_down().max(0.0), at, at.next_up().min(1.0)]
+            });
+            for number in numbers.chain(edges).chain((0..1000).map(|_| random.unit())) {
+                let (i, part) = sums.pick(number);
+                let among_all = up_to.partition_point(|sum| *sum <= number * up_to[count - 1]).min(count - 1);
+                assert_eq!(i, among_all, "{number} of {count}");
+                assert!((0.0..=1.0).contains(&part));
+            }
+        }
+    }
 }

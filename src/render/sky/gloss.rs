@@ -1,5 +1,6 @@
 //! What a rough surface mirrors of a panorama, without a ray: lookups along the directions that its facets send the view to.
 
+use super::lookups::{LOOKUPS, Lookups, Row};
 use super::panorama::{Pyramid, coordinates};
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Level, Simd};
@@ -9,29 +10,21 @@ use crate::render::sobol::mix;
 use std::f32::consts::PI;
 use std::sync::LazyLock;
 
-/// Lookups that make up a lobe.
-const LOOKUPS: usize = 64;
-
 /// Width of the hills that stand for the lookups' shares of the sphere, in roots of those: as wide as they are apart.
 const HILL: f32 = 0.75;
-
-/// A number of every lookup.
-type Row = [f32; LOOKUPS];
 
 /// What draws their facets.
 static PATTERN: LazyLock<[Row; 3]> = LazyLock::new(|| pattern(0.0));
 
-/// The lookups of a lobe, side by side.
-struct Lookups {
-    /// Where they go, in the panorama's frame, by axis.
-    dirs: [Row; 3],
-    /// Their coordinates in it.
-    around: Row,
-    down: Row,
-    /// How blurred each is, and how much it counts; 0 for those that do not.
-    angle: Row,
-    weight: Row,
-}
+/// Slopes along two axes of facets that stand for equal shares of a GGX distribution of width 1.
+static SLOPES: LazyLock<[Row; 2]> = LazyLock::new(|| {
+    /// The golden ratio's inverse: turns that never meet.
+    const GOLDEN: f32 = 0.618_034;
+    let part = |k: usize| (k as f32 + 0.5) / LOOKUPS as f32;
+    let slope = |k: usize, axis: f32| axis * (part(k) / (1.0 - part(k))).sqrt();
+    let turn = |k: usize| libm::sincosf(2.0 * PI * (k as f32 * GOLDEN).fract());
+    [std::array::from_fn(|k| slope(k, turn(k).1)), std::array::from_fn(|k| slope(k, turn(k).0))]
+});
 
 /// How the pattern is turned and shifted for a point of a surface.
 #[derive(Clone, Copy)]
@@ -55,23 +48,26 @@ impl Turn {
     }
 }
 
-/// Finds the lookups along which facets of `lobe` are seen from `view`.
-struct Find<'a, F> {
-    to: &'a mut Lookups,
+/// Looks along where facets of `lobe` send `view`.
+struct Look<'a, F> {
+    sky: &'a Pyramid,
     lobe: &'a Lobe,
     view: Vec3,
     turn: Turn,
     to_map: F,
 }
 
-impl<F: Fn(Vec3) -> Vec3> Kernel for Find<'_, F> {
-    type Output = ();
+impl<F: Fn(Vec3) -> Vec3> Kernel for Look<'_, F> {
+    type Output = Option<Vec3>;
 
     // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
     #[inline(always)]
-    fn run<S: Simd>(self, _: S) {
-        let Self { to, lobe, view, turn: Turn { around: [c, s], shift }, to_map } = self;
+    fn run<S: Simd>(self, _: S) -> Option<Vec3> {
+        let Self { sky, lobe, view, turn: Turn { around: [c, s], shift }, to_map } = self;
         let (lobe, [at, cos, sin]) = (*lobe, &*PATTERN);
+        // Where they go, in the panorama's frame, by axis.
+        let mut dirs = [[0.0; LOOKUPS]; 3];
+        let mut to = Lookups::NONE;
         for k in 0..LOOKUPS {
             let turned = [c * cos[k] - s * sin[k], s * cos[k] + c * sin[k]];
             let facet = lobe.facet_turned(view, at[k] + shift / LOOKUPS as f32, turned);
@@ -80,15 +76,30 @@ impl<F: Fn(Vec3) -> Vec3> Kernel for Find<'_, F> {
             to.weight[k] = lobe.sent(view, dir);
             to.angle[k] = HILL * area.min(4.0 * PI).sqrt();
             let dir = to_map(dir);
-            (to.dirs[0][k], to.dirs[1][k], to.dirs[2][k]) = (dir.x, dir.y, dir.z);
+            (dirs[0][k], dirs[1][k], dirs[2][k]) = (dir.x, dir.y, dir.z);
         }
         for k in 0..LOOKUPS {
-            (to.around[k], to.down[k]) = coordinates(Vec3::new(to.dirs[0][k], to.dirs[1][k], to.dirs[2][k]));
+            (to.around[k], to.down[k]) = coordinates(Vec3::new(dirs[0][k], dirs[1][k], dirs[2][k]));
         }
+        to.mean(&sky.soft)
     }
 }
 
 impl Pyramid {
+    /// Mean radiance in the lobe of a rough mirror that sends the view along `dir`, seen along its own normal.
+    ///
+    /// Directions are drawn from the GGX distribution, each looked up as blurred as directions are few there (J. Křivánek,
+    /// M. Colbert, "Real-time Shading with Filtered Importance Sampling", 2008).
+    pub(super) fn blurred(&self, dir: Vec3, roughness: f32) -> Vec3 {
+        let alpha = roughness * roughness;
+        // Narrower than a texel is not blurred.
+        if 2.0 * alpha < self.finest() {
+            return self.radiance(dir, 0.0);
+        }
+        let mean = Level::best().run(LookAround { sky: self, dir, alpha });
+        mean.unwrap_or_else(|| self.radiance(dir, PI))
+    }
+
     /// Mean radiance as facets of `lobe` that are seen from `view` mirror it and others let it through; `to_map` turns
     /// directions into those of the panorama. `None` where the lobe is narrower than a texel, or shows nothing.
     ///
@@ -99,16 +110,43 @@ impl Pyramid {
         if lobe.angle(1) < self.finest() {
             return None;
         }
-        let row = [0.0; LOOKUPS];
-        let mut lookups = Lookups { dirs: [row; 3], around: row, down: row, angle: row, weight: row };
-        Level::best().run(Find { to: &mut lookups, lobe, view, turn: Turn::of(lobe, view), to_map });
-        let Lookups { around, down, angle, weight, .. } = &lookups;
-        let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
-        for k in (0..LOOKUPS).filter(|&k| weight[k] > 0.0) {
-            sum += self.smooth_radiance((around[k], down[k]), angle[k]) * weight[k];
-            weights += weight[k];
+        Level::best().run(Look { sky: self, lobe, view, turn: Turn::of(lobe, view), to_map })
+    }
+}
+
+/// Looks around a direction, as widely as facets of this width spread what is seen along their normal.
+struct LookAround<'a> {
+    sky: &'a Pyramid,
+    dir: Vec3,
+    alpha: f32,
+}
+
+impl Kernel for LookAround<'_> {
+    type Output = Option<Vec3>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> Option<Vec3> {
+        let Self { sky, dir, alpha } = self;
+        let [along, across] = &*SLOPES;
+        let (tangent, bitangent) = dir.any_orthonormal_pair();
+        let mut dirs = [[0.0; LOOKUPS]; 3];
+        let mut to = Lookups::NONE;
+        for k in 0..LOOKUPS {
+            let (x, y) = (along[k] * alpha, across[k] * alpha);
+            let cosine = 1.0 / (1.0 + x * x + y * y).sqrt();
+            let half = (dir + tangent * x + bitangent * y) * cosine;
+            let light = half * (2.0 * cosine) - dir;
+            to.weight[k] = light.dot(dir).max(0.0);
+            // Each stands for an equal share of the lobe: as much of the sphere as the distribution is thin there.
+            let f = cosine * cosine * (alpha * alpha - 1.0) + 1.0;
+            let density = alpha * alpha / (PI * f * f) / 4.0;
+            to.angle[k] = (1.0 / (LOOKUPS as f32 * density)).sqrt();
+            (dirs[0][k], dirs[1][k], dirs[2][k]) = (light.x, light.y, light.z);
         }
-        (weights > 0.0).then(|| sum / weights)
+        for k in 0..LOOKUPS {
+            (to.around[k], to.down[k]) = coordinates(Vec3::new(dirs[0][k], dirs[1][k], dirs[2][k]));
+        }
+        to.mean(&sky.levels)
     }
 }
 

@@ -3,8 +3,10 @@
 mod around;
 mod beyond;
 mod chance;
+mod diffuse;
 mod glare;
 mod gloss;
+mod lookups;
 mod panorama;
 
 pub(crate) use around::{Arounds, Standpoint};

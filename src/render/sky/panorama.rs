@@ -1,42 +1,20 @@
 //! A panorama and smaller copies of it, asked for its radiance at any blur.
 
+use super::diffuse;
 use crate::math::Vec3;
 use crate::math::formula::{atan2, floor_of_one, log2};
-use crate::math::simd::{self, Kernel, LANES, Simd};
 use crate::scene::Panorama;
 use rayon::prelude::*;
 use std::f32::consts::PI;
-use std::sync::{Arc, LazyLock};
-
-/// Lookups that make up a rough lobe.
-const LOOKUPS: usize = 64;
-
-/// Columns and rows of the table of diffuse light.
-const DIFFUSE: (u32, u32) = (128, 64);
-
-/// Columns and rows of the cells whose light it sums.
-const CELLS: (u32, u32) = (64, 32);
-
-/// Columns of places that a cell is asked at, and rows.
-const FINER: u32 = 8;
-
-/// Slopes along two axes of facets that stand for equal shares of a GGX distribution of width 1.
-static PATTERN: LazyLock<[[f32; 2]; LOOKUPS]> = LazyLock::new(|| {
-    /// The golden ratio's inverse: turns that never meet.
-    const GOLDEN: f32 = 0.618_034;
-    std::array::from_fn(|k| {
-        let part = (k as f32 + 0.5) / LOOKUPS as f32;
-        let (sin, cos) = libm::sincosf(2.0 * PI * (k as f32 * GOLDEN).fract());
-        [cos, sin].map(|axis| axis * (part / (1.0 - part)).sqrt())
-    })
-});
+use std::sync::Arc;
 
 /// The levels of a panorama, each half as large as the one before.
 #[derive(Clone, Debug)]
 pub(super) struct Pyramid {
-    levels: Vec<Level>,
-    /// The same sizes from the second on, each a smooth mean of the one before: a small sun stays where it is in all of them.
-    soft: Vec<Level>,
+    pub levels: Vec<Level>,
+    /// The first again, and the other sizes, each a smooth mean of the one before: a small sun stays where it is in all of
+    /// them.
+    pub soft: Vec<Level>,
     diffuse: Level,
 }
 
@@ -53,13 +31,13 @@ impl Pyramid {
     pub(super) fn new(panorama: &Panorama) -> Self {
         let Panorama { width, height, texels, .. } = panorama;
         let levels = Level { width: *width, height: *height, texels: Arc::clone(texels) }.halves();
-        let mut soft: Vec<Level> = Vec::new();
-        for to in &levels[1..] {
-            soft.push(soft.last().unwrap_or(&levels[0]).softened((to.width, to.height)));
+        let mut soft = vec![levels[0].clone()];
+        for (i, to) in levels[1..].iter().enumerate() {
+            soft.push(soft[i].softened((to.width, to.height)));
         }
         let mut pyramid =
             Self { levels, soft, diffuse: Level { width: 1, height: 1, texels: Arc::new(vec![[0.0; 3]]) } };
-        pyramid.diffuse = pyramid.spread();
+        pyramid.diffuse = diffuse::table(&pyramid);
         pyramid
     }
 
@@ -82,133 +60,29 @@ impl Pyramid {
 
     /// Mean radiance in a cone of this angle across.
     pub(super) fn radiance(&self, dir: Vec3, angle: f32) -> Vec3 {
-        let finest = self.levels[0].angle();
-        self.at_level(dir, if angle > finest { log2(angle / finest) } else { 0.0 })
+        let ((fine, part), at) = (self.level(angle), coordinates(dir));
+        let sharp = self.copy(fine).at(at);
+        if part == 0.0 { sharp } else { sharp.lerp(self.copy(fine + 1).at(at), part) }
     }
 
-    /// About the same at a direction's [`coordinates`], without the borders of texels: the mean weighted by a smooth hill of
-    /// this width.
-    pub(super) fn smooth_radiance(&self, at: (f32, f32), angle: f32) -> Vec3 {
-        let level = log2((angle / self.finest()).max(1.0)).min(self.soft.len() as f32);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the levels there are")]
-        let fine = level as usize;
-        let plane = |k: usize| if k == 0 { &self.levels[0] } else { &self.soft[k - 1] };
-        let sharp = plane(fine).at(at);
-        sharp.lerp(plane((fine + 1).min(self.soft.len())).at(at), level - fine as f32)
+    /// The copy whose texels are as wide as a cone of this angle or the next finer, and how far it is from there to the one
+    /// after it.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the levels there are")]
+    pub(super) fn level(&self, angle: f32) -> (usize, f32) {
+        let finest = self.finest();
+        let level = if angle > finest { log2(angle / finest) } else { 0.0 };
+        let level = level.clamp(0.0, (self.levels.len() - 1) as f32);
+        (level as usize, level - (level as usize) as f32)
     }
 
-    /// Between the two nearest levels.
-    fn at_level(&self, dir: Vec3, level: f32) -> Vec3 {
-        let last = self.levels.len() - 1;
-        let level = level.clamp(0.0, last as f32);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the levels there are")]
-        let fine = level as usize;
-        let part = level - fine as f32;
-        let at = coordinates(dir);
-        let sharp = self.levels[fine].at(at);
-        if part == 0.0 { sharp } else { sharp.lerp(self.levels[(fine + 1).min(last)].at(at), part) }
-    }
-
-    /// Mean radiance in the lobe of a rough mirror that sends the view along `dir`, seen along its own normal.
-    ///
-    /// Directions are drawn from the GGX distribution, each looked up as blurred as directions are few there (J. Křivánek,
-    /// M. Colbert, "Real-time Shading with Filtered Importance Sampling", 2008).
-    pub(super) fn blurred(&self, dir: Vec3, roughness: f32) -> Vec3 {
-        let alpha = roughness * roughness;
-        // Narrower than a texel is not blurred.
-        if 2.0 * alpha < self.levels[0].angle() {
-            return self.radiance(dir, 0.0);
-        }
-        let (tangent, bitangent) = dir.any_orthonormal_pair();
-        let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
-        for [x, y] in PATTERN.iter().map(|slopes| slopes.map(|slope| slope * alpha)) {
-            let cosine = 1.0 / (1.0 + x * x + y * y).sqrt();
-            let half = (dir + tangent * x + bitangent * y) * cosine;
-            let light = half * (2.0 * cosine) - dir;
-            let weight = light.dot(dir);
-            if weight <= 0.0 {
-                continue;
-            }
-            // Each stands for an equal share of the lobe: as much of the sphere as the distribution is thin there.
-            let f = cosine * cosine * (alpha * alpha - 1.0) + 1.0;
-            let density = alpha * alpha / (PI * f * f) / 4.0;
-            let area = 1.0 / (LOOKUPS as f32 * density);
-            sum += self.radiance(light, area.sqrt()) * weight;
-            weights += weight;
-        }
-        if weights > 0.0 { sum / weights } else { self.radiance(dir, PI) }
+    /// A copy by its number, the last for those beyond.
+    pub(super) fn copy(&self, number: usize) -> &Level {
+        &self.levels[number.min(self.levels.len() - 1)]
     }
 
     /// Cosine-weighted mean radiance around a normal.
     pub(super) fn diffuse(&self, normal: Vec3) -> Vec3 {
         self.diffuse.at(coordinates(normal))
-    }
-
-    /// The table of diffuse light: sums over cells, each of which keeps the vector integral of its light, so that a sun
-    /// shines from where it is and not from the middle of its cell.
-    fn spread(&self) -> Level {
-        let (width, height) = CELLS;
-        let grid = Level { width, height, texels: Arc::default() };
-        let fine = Level { width: width * FINER, height: height * FINER, texels: Arc::default() };
-        let cell = |(row, column): (u32, u32)| {
-            let (mut light, mut even) = ([Vec3::ZERO; 3], Vec3::ZERO);
-            for (j, i) in (0..FINER).flat_map(|j| (0..FINER).map(move |i| (j, i))) {
-                let part = |k: u32| (k as f32 + 0.5) / FINER as f32;
-                let dir = grid.direction(column as f32 + part(i), row as f32 + part(j));
-                let by_area = dir * fine.area(row * FINER + j);
-                let seen = self.radiance(dir, fine.angle());
-                even += by_area;
-                light[0] += by_area * seen.x;
-                light[1] += by_area * seen.y;
-                light[2] += by_area * seen.z;
-            }
-            (light, even)
-        };
-        let places: Vec<(u32, u32)> = (0..height).flat_map(|row| (0..width).map(move |column| (row, column))).collect();
-        let cells: Vec<([Vec3; 3], Vec3)> = places.into_par_iter().map(cell).collect();
-        let (width, height) = DIFFUSE;
-        let table = Level { width, height, texels: Arc::default() };
-        let normals: Vec<Vec3> = table.middles().map(|(_, normal)| normal).collect();
-        let eights = normals.par_chunks(LANES);
-        let means = eights.flat_map_iter(|normals| {
-            let means = simd::Level::best().run(Means { cells: &cells, normals });
-            means.into_iter().take(normals.len())
-        });
-        let texels = means.collect();
-        Level { width, height, texels: Arc::new(texels) }
-    }
-}
-
-/// Cosine-weighted means around eight normals at most, side by side.
-struct Means<'a> {
-    /// Vector integrals of the light of each channel, and of an even light.
-    cells: &'a [([Vec3; 3], Vec3)],
-    normals: &'a [Vec3],
-}
-
-impl Kernel for Means<'_> {
-    type Output = [[f32; 3]; LANES];
-
-    #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> [[f32; 3]; LANES] {
-        let (mut x, mut y, mut z) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        for (i, normal) in self.normals.iter().enumerate().take(LANES) {
-            (x[i], y[i], z[i]) = (normal.x, normal.y, normal.z);
-        }
-        let (x, y, z, zero) = (s.load(&x), s.load(&y), s.load(&z), s.splat(0.0));
-        let mut sums = [zero; 4];
-        for ([red, green, blue], even) in self.cells {
-            for (sum, of) in sums.iter_mut().zip([red, green, blue, even]) {
-                let across = s.add(s.mul(x, s.splat(of.x)), s.mul(y, s.splat(of.y)));
-                *sum = s.add(*sum, s.greater(s.add(across, s.mul(z, s.splat(of.z))), zero));
-            }
-        }
-        let mut means = [[0.0; 3]; LANES];
-        for k in 0..3 {
-            let channel = s.store(s.div(sums[k], sums[3]));
-            (0..LANES).for_each(|i| means[i][k] = channel[i]);
-        }
-        means
     }
 }
 
@@ -222,9 +96,13 @@ pub(super) fn coordinates(dir: Vec3) -> (f32, f32) {
 
 impl Level {
     /// The places of a copy alone.
-    #[cfg(test)]
     pub(super) fn without_texels((width, height): (u32, u32)) -> Self {
         Self { width, height, texels: Arc::default() }
+    }
+
+    /// The same places with these texels, row by row.
+    pub(super) fn made_of(self, texels: Vec<[f32; 3]>) -> Self {
+        Self { texels: Arc::new(texels), ..self }
     }
 
     /// It and all that are half as large as the one before.
@@ -262,6 +140,12 @@ impl Level {
         ring * 2.0 * PI / self.width as f32
     }
 
+    /// All texels, row by row.
+    #[inline(always)]
+    pub(super) fn texels(&self) -> &[[f32; 3]] {
+        &self.texels
+    }
+
     pub(super) fn texel(&self, column: u32, row: u32) -> Vec3 {
         let i = row as usize * self.width as usize + column as usize;
         self.texels.get(i).map_or(Vec3::ZERO, |&texel| Vec3::from(texel))
@@ -283,13 +167,14 @@ impl Level {
     }
 
     /// Row and direction of the middle of each texel.
+    #[cfg(test)]
     pub(super) fn middles(&self) -> impl Iterator<Item = (u32, Vec3)> + '_ {
         let row = move |y: u32| (0..self.width).map(move |x| (y, self.direction(x as f32 + 0.5, y as f32 + 0.5)));
         (0..self.height).flat_map(row)
     }
 
     /// Between the four nearest texels of a place, both its coordinates 0 … 1.
-    fn at(&self, (x, y): (f32, f32)) -> Vec3 {
+    pub(super) fn at(&self, (x, y): (f32, f32)) -> Vec3 {
         let (width, height) = (self.width.cast_signed(), self.height.cast_signed());
         let (x, y) = (x * self.width as f32 - 0.5, y * self.height as f32 - 0.5);
         let (left, top) = (floor_of_one(x), floor_of_one(y));
@@ -414,9 +299,7 @@ mod tests {
             let sky = pyramid(width, height, |_, _| [2.0, 1.0, 0.5]);
             for dir in probes() {
                 let sharp = [sky.radiance(dir, 0.3), sky.blurred(dir, 0.4), sky.blurred(dir, 1.0), sky.diffuse(dir)];
-                let angles = (0..14).map(|k| sky.finest() * 1.5 * f32::from(1_u16 << k));
-                let soft = angles.map(|angle| sky.smooth_radiance(coordinates(dir), angle));
-                for seen in sharp.into_iter().chain(soft) {
+                for seen in sharp {
                     assert!((seen - Vec3::new(2.0, 1.0, 0.5)).length() < 1e-4, "{width}×{height} {dir}: {seen}");
                 }
             }
