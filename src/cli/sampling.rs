@@ -321,15 +321,13 @@ pub(super) fn flags(settings: &Settings, mut set: impl FnMut(&str, String)) {
 
 /// How the picture was sampled, in words.
 pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
-    let own: u64 = sampled.counts.iter().copied().map(u64::from).sum();
-    let each = |rays: u64| rays as f64 / sampled.pixels.max(1) as f64;
     if let Some(to) = sampled.targeted {
         let at_most = if to.estimate.is_none() { "at most " } else { "" };
         return format!(
             "{:.1} samples a pixel (at most {}) and {:.1} to find out how many, of what they met error {at_most}{:.4} where {} was asked for (foretold {:.4} and {:.1} s of processor time, took {:.1} s)",
-            each(own),
+            sampled.samples(),
             sampled.most(),
-            each(sampled.rays.saturating_sub(own)),
+            sampled.mean() - sampled.samples(),
             sampled.rmse().unwrap_or(to.foretold),
             to.target,
             to.foretold,
@@ -340,19 +338,19 @@ pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
     match settings.sampling {
         Sampling::Uniform => format!("{} a pixel", so_many(u64::from(settings.samples), "sample")),
         Sampling::Adaptive(_) => {
-            format!("adaptive, {:.1} samples a pixel (at most {})", sampled.mean(), sampled.most())
+            format!("adaptive, {:.1} samples a pixel (at most {})", sampled.samples(), sampled.most())
         }
         Sampling::Stochastic(how) => {
             let percent = |n: u64| 100.0 * n as f64 / sampled.pixels.max(1) as f64;
             let rmse = sampled.rmse().unwrap_or(0.0);
             format!(
                 "{:.1} samples a pixel (at most {}), of what they met {:.1} % of pixels within {} at {} %, error about {rmse:.4} at most, {:.0} % of the rays to spare",
-                each(own),
+                sampled.samples(),
                 sampled.most(),
                 percent(sampled.met),
                 how.error,
                 100.0 * how.confidence,
-                100.0 * sampled.spare as f64 / sampled.rays.max(1) as f64,
+                100.0 * sampled.spare as f64 / sampled.own().max(1) as f64,
             )
         }
     }

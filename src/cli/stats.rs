@@ -8,7 +8,7 @@
 //! | `schema`, `version` | `meshray-stats/1`; version of meshray |
 //! | `inputs`, `output`, `input_hash` | files as typed (`-`: standard streams); xxh3-128 of what was read, hexadecimal |
 //! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `intersector`, `threads` | settings that were used |
-//! | `sampling` | `aa` and its settings (then `samples`, that of uniform sampling, is `null`); eye `rays`, their `mean` for each pixel of the picture (those that tiles trace again at their borders are among them) and the `most` of one; of stochastic sampling pixels that `met` `pixel_error`, those stopped at the `ceiling`, and the picture's `rmse` in `error_space`: of several renderings estimated, of one a cautious bound |
+//! | `sampling` | `aa` and its settings (then `samples`, that of uniform sampling, is `null`); eye `rays`, their `mean` for each pixel of the picture (those that tiles trace again at their borders, and those `looked` with, are among them) and the `most` samples of one; of stochastic sampling pixels that `met` `pixel_error`, those stopped at the `ceiling`, rays `spare`, those with which it was `looked` beforehand for what rays spread by chance seldom meet, and the picture's `rmse` in `error_space`: of several renderings estimated, of one a cautious bound |
 //! | `auto` | `null`, or why `--accel auto` took `accel`: `why` in words; `rays` and `prims` of the sample; cost of a ray through `fast-octree` and `fast-bvh`, in nodes of eight boxes, `null` where no sample was taken |
 //! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); of grids and octrees `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `grid_cells` (`null`: by density), `max_references`, `assign`, `mailbox` as well |
 //! | `seconds` | of the timed run: `load`, `build`, `meter` (finding the exposure of lamps in lux and candela), `render`, `write`; `load` and `build` are 0 for further pictures of one scene, `meter` is 0 for further pictures of one view and where no lamps are metered |
@@ -222,7 +222,7 @@ fn told(making: &Making, times: &Times, world: &World, structure: StructureStats
         making.shot.target.path().map_or("-".into(), |path| path.to_string_lossy()),
         settings.width,
         settings.height,
-        making.sampled.mean(),
+        making.sampled.samples(),
         making.depth,
         making.accel.name(),
         rayon::current_num_threads(),

@@ -28,16 +28,27 @@ type Channel = [f32; TOGETHER];
 pub(super) trait Sample: Copy + Default + Eq + Send + Sync {
     /// The largest code.
     const MAX: Self;
+    /// As a number.
+    const STEPS: f32;
     /// The codes of linear light on the sRGB curve.
     fn codes(linear: &Channel) -> [Self; TOGETHER];
     /// Code of a coverage 0..=1; not on the sRGB curve.
     fn alpha(coverage: f32) -> Self;
+    /// That code, with what is cut off of it.
+    #[inline(always)]
+    fn uncut(coverage: f32) -> f32 {
+        coverage.clamp(0.0, 1.0) * Self::STEPS + 0.5
+    }
     /// Whether that is the largest.
-    fn is_solid(coverage: f32) -> bool;
+    #[inline(always)]
+    fn is_solid(coverage: f32) -> bool {
+        Self::uncut(coverage) >= Self::STEPS
+    }
 }
 
 impl Sample for u8 {
     const MAX: Self = Self::MAX;
+    const STEPS: f32 = 255.0;
     #[inline(always)]
     fn codes(linear: &Channel) -> [Self; TOGETHER] {
         srgb::encode8_lanes(linear)
@@ -45,16 +56,13 @@ impl Sample for u8 {
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range, and the cast maps NaN to 0")]
     fn alpha(coverage: f32) -> Self {
-        (coverage.clamp(0.0, 1.0) * 255.0 + 0.5) as Self
-    }
-    #[inline(always)]
-    fn is_solid(coverage: f32) -> bool {
-        coverage.clamp(0.0, 1.0) * 255.0 + 0.5 >= 255.0
+        Self::uncut(coverage) as Self
     }
 }
 
 impl Sample for u16 {
     const MAX: Self = Self::MAX;
+    const STEPS: f32 = 65_535.0;
     #[inline(always)]
     fn codes(linear: &Channel) -> [Self; TOGETHER] {
         let codes = srgb::codes16();
@@ -63,11 +71,7 @@ impl Sample for u16 {
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range, and the cast maps NaN to 0")]
     fn alpha(coverage: f32) -> Self {
-        (coverage.clamp(0.0, 1.0) * 65_535.0 + 0.5) as Self
-    }
-    #[inline(always)]
-    fn is_solid(coverage: f32) -> bool {
-        coverage.clamp(0.0, 1.0) * 65_535.0 + 0.5 >= 65_535.0
+        Self::uncut(coverage) as Self
     }
 }
 

@@ -13,6 +13,9 @@
 //! Layers are name prefixes within one flat part, no name is a bare number, and the beauty has the plain names: that
 //! is what compositing programs and libraries agree on. Equal pictures and metadata give equal bytes.
 
+mod window;
+
+use self::window::Window;
 use super::metadata::MAX_TEXT;
 use super::{Channel, ExrSamples, FileKind, ImageError, Layers, Metadata, Output, Picture, Values};
 use crate::math::primaries::Primaries;
@@ -21,7 +24,7 @@ use crate::quiet::attempt;
 use crate::threads;
 use ::exr::image::{Blocks, Encoding, FlatSamples, Image, Layer};
 use ::exr::meta::MetaData;
-use ::exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text};
+use ::exr::meta::attribute::{AttributeValue, Chromaticities, LineOrder, Text};
 use ::exr::prelude::{
     AnyChannel, AnyChannels, Compression, LayerAttributes, ReadChannels, ReadLayers, SmallVec, Vec2, WritableImage, f16,
 };
@@ -82,13 +85,13 @@ fn channels(picture: &Picture, output: &Output) -> SmallVec<[AnyChannel<FlatSamp
     let ids = |name: &str, values: &[u32]| AnyChannel::new(text(name), FlatSamples::U32(values.to_vec()));
 
     let mut list = SmallVec::new();
-    let mut beauty = [(); 4].map(|()| Vec::with_capacity(picture.beauty.len()));
-    for (at, &pixel) in picture.beauty.iter().enumerate() {
-        // Noise of few rays around nothing falls below it; programs that read pictures take no light for less than none.
-        let pixel = over(pixel, output.background, picture.veil.get(at)).map(|x| if x < 0.0 { 0.0 } else { x });
-        beauty.iter_mut().zip(pixel).for_each(|(values, x)| values.push(x));
-    }
-    list.extend(["R", "G", "B", "A"].into_iter().zip(beauty).map(|(name, values)| color(name, values)));
+    let beauty = match output.exr_samples {
+        ExrSamples::Float => beauty(picture, output.background, |x| x).map(FlatSamples::F32),
+        ExrSamples::Half => beauty(picture, output.background, half).map(FlatSamples::F16),
+    };
+    list.extend(
+        ["R", "G", "B", "A"].into_iter().zip(beauty).map(|(name, samples)| AnyChannel::new(text(name), samples)),
+    );
     let Some(layers) = &picture.layers else { return list };
     let axis = |values: &[[f32; 3]], i: usize| values.iter().map(|v| v[i]).collect::<Vec<f32>>();
     for i in 0..3 {
@@ -116,6 +119,17 @@ fn channels(picture: &Picture, output: &Output) -> SmallVec<[AnyChannel<FlatSamp
         Values::F32(values) => floats(&channel.name, values.clone()),
     }));
     list
+}
+
+/// Red, green, blue and alpha of all pixels, each as it is stored.
+fn beauty<T>(picture: &Picture, background: Option<[f32; 3]>, stored: impl Fn(f32) -> T) -> [Vec<T>; 4] {
+    let mut planes = [(); 4].map(|()| Vec::with_capacity(picture.beauty.len()));
+    for (at, &pixel) in picture.beauty.iter().enumerate() {
+        let pixel = over(pixel, background, picture.veil.get(at));
+        // Noise of few rays around nothing falls below it; programs that read pictures take no light for less than none.
+        planes.iter_mut().zip(pixel).for_each(|(plane, x)| plane.push(stored(if x < 0.0 { 0.0 } else { x })));
+    }
+    planes
 }
 
 /// The largest number that a half float holds.
@@ -242,48 +256,6 @@ fn turn(turned: DMat3, pixel: &mut [f32; 4]) {
     let [r, g, b, _] = pixel.map(f64::from);
     let color = turned * DVec3::new(r, g, b);
     [pixel[0], pixel[1], pixel[2]] = color.to_array().map(|c| c as f32);
-}
-
-/// Which of the pixels that are stored a picture shows, and where.
-struct Window {
-    /// Columns and rows of the picture.
-    size: Vec2<usize>,
-    /// Columns and rows that are stored.
-    stored: Vec2<usize>,
-    /// The first of them, from the first of the picture.
-    first: Vec2<i64>,
-}
-
-impl Window {
-    fn of(stored: Vec2<usize>, at: Vec2<i32>, display: IntegerBounds) -> Self {
-        let apart = |at: i32, display: i32| i64::from(at) - i64::from(display);
-        let first = Vec2(apart(at.0, display.position.0), apart(at.1, display.position.1));
-        Self { size: display.size, stored, first }
-    }
-
-    /// Whether any that is stored is not shown.
-    fn is_cropped(&self) -> bool {
-        let is_within = |first: i64, stored: usize, size: usize| first >= 0 && stored as i64 <= size as i64 - first;
-        let Self { size, stored, first } = self;
-        !(is_within(first.0, stored.0, size.0) && is_within(first.1, stored.1, size.1))
-    }
-
-    /// What the picture has of such values, and `outside` where none is stored.
-    fn shown<T: Copy>(&self, values: Vec<T>, outside: T) -> Vec<T> {
-        if (self.size, self.first) == (self.stored, Vec2(0, 0)) {
-            return values;
-        }
-        let mut shown = vec![outside; self.size.area()];
-        let place = |i: i64, first: i64, stored: usize| usize::try_from(i - first).ok().filter(|&i| i < stored);
-        for (y, row) in (0..).zip(shown.chunks_mut(self.size.0.max(1))) {
-            let Some(stored) = place(y, self.first.1, self.stored.1) else { continue };
-            let stored = &values[stored * self.stored.0..][..self.stored.0];
-            for (x, to) in (0..).zip(row) {
-                *to = place(x, self.first.0, self.stored.0).map_or(outside, |x| stored[x]);
-            }
-        }
-        shown
-    }
 }
 
 /// The channels of a part, found by name.

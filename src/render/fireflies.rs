@@ -31,7 +31,7 @@ const MOST: u32 = 16;
 
 /// Of a pixel that shows something bright so many more samples are taken, …
 const AGAIN: u32 = 16;
-/// … and it is a firefly if hardly any shows it again: a pixel that shows it often will find out by itself.
+/// … and it is a firefly if no more of so many others show it: a pixel that shows it often will find out by itself.
 const SELDOM: usize = 2;
 
 /// What is this part as bright is nearly as bright.
@@ -41,7 +41,7 @@ const NEARLY: f32 = 0.25;
 const CELL: u32 = TILE;
 /// Fireflies are looked for so many cells away: what one of thousands of samples meets is then hardly overlooked.
 const REACH: usize = 2;
-/// Fewest fireflies that tell how many there are in a cell, in nine, and in all of these.
+/// Fewest pixels with fireflies that tell how many there are in a cell, in nine, and in all of these.
 const FEWEST: [u32; REACH + 1] = [4, 2, 1];
 
 /// What samples of some cells have shown that may have met something by chance.
@@ -50,9 +50,10 @@ struct Told {
     samples: u32,
     /// The sum of their light, no more than white each.
     light: f64,
-    /// Fireflies among them, and the sum of their light.
+    /// Fireflies among them, the sum of their light, and how many pixels showed any.
     fireflies: u32,
     bright: f64,
+    pixels: u32,
 }
 
 impl Told {
@@ -62,6 +63,7 @@ impl Told {
             light: self.light + other.light,
             fireflies: self.fireflies + other.fireflies,
             bright: self.bright + other.bright,
+            pixels: self.pixels + other.pixels,
         }
     }
 
@@ -175,13 +177,15 @@ pub(super) fn look<P: Observer>(
         return (rays, counts);
     }
     let asked = asked.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let bright: Vec<Bright> = asked.iter().flat_map(|grid| grid.bright(step)).collect();
-    let some: Vec<&[Bright]> = bright.chunks(TOGETHER / AGAIN as usize).collect();
-    let work = |tracer: &mut Tracer<_, P>, some: &&[Bright]| question.ask_again(tracer, some);
+    let mut bright: Vec<Bright> = asked.iter().flat_map(|grid| grid.bright(step)).collect();
+    bright.sort_by_key(|bright| bright.pixel);
+    let pixels: Vec<&[Bright]> = bright.chunk_by(|one, next| one.pixel == next.pixel).collect();
+    let some: Vec<&[&[Bright]]> = pixels.chunks(TOGETHER / AGAIN as usize).collect();
+    let work = |tracer: &mut Tracer<_, P>, some: &&[&[Bright]]| question.ask_again(tracer, &asked, some);
     let (answers, more, complete) = each_tile(context, accel, &some, &Quiet(progress), work);
     counts.extend(more);
     if complete {
-        rays += bright.len() as u64 * u64::from(AGAIN);
+        rays += pixels.len() as u64 * u64::from(AGAIN);
         let (rare, told) = (answers.into_iter().flatten().collect(), in_cells(&asked, (CELL / step) as usize));
         let output = output(how.space, question.frame.background);
         let judge = Certainty::of(question.frame, how, output.as_ref(), context.scene.background);
@@ -238,19 +242,35 @@ impl Question<'_> {
         each.collect()
     }
 
-    /// Asks some pixels for more samples, and tells which of them show what they did by chance. `None` when cancelled.
-    fn ask_again<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, some: &[Bright]) -> Option<Vec<Bright>> {
+    /// Asks some pixels, of each of which bright samples are among those `asked` before, for more; the ones that they hardly
+    /// show again. `None` when cancelled.
+    fn ask_again<A: Accel, P: Observer>(
+        &self,
+        tracer: &mut Tracer<A, P>,
+        asked: &[Grid],
+        some: &[&[Bright]],
+    ) -> Option<Vec<Bright>> {
         let seed = self.frame.settings.seed;
-        let wanted = some.iter().flat_map(|&Bright { pixel, .. }| {
+        let wanted = some.iter().flat_map(|bright| {
+            let pixel = bright[0].pixel;
             (self.samples..self.samples + AGAIN).map(move |index| Wanted { pixel, key: pixel_key(seed, pixel), index })
         });
         Places::default().trace(self.frame, self.how, tracer, (Roulette::default(), wanted))?;
         let each = some.iter().zip(tracer.samples.chunks(AGAIN as usize));
-        let is_rare = |(bright, samples): &(&Bright, &[Sample])| {
-            samples.iter().filter(|sample| self.light(sample) >= NEARLY * bright.light).count() <= SELDOM
-        };
-        Some(each.filter(is_rare).map(|(bright, _)| *bright).collect())
+        let rare = each.flat_map(|(bright, again)| {
+            let (x, y) = bright[0].pixel;
+            let before = asked.iter().map(|grid| grid.at((x / self.step) as usize, (y / self.step) as usize).light);
+            let lights: Vec<f32> = before.chain(again.iter().map(|sample| self.light(sample))).collect();
+            bright.iter().copied().filter(move |bright| is_rare(bright.light, &lights))
+        });
+        Some(rare.collect())
     }
+}
+
+/// Whether hardly any of all samples of a pixel, of which this is one, is nearly as bright.
+fn is_rare(light: f32, all: &[f32]) -> bool {
+    let (again, others) = (all.iter().filter(|other| **other >= NEARLY * light).count() - 1, all.len() - 1);
+    again * AGAIN as usize <= SELDOM * others
 }
 
 /// The samples of one index of all pixels that were asked, row by row.
@@ -272,13 +292,17 @@ impl Grid {
         }
     }
 
+    fn at(&self, x: usize, y: usize) -> Asked {
+        self.each[y * self.columns + x]
+    }
+
     /// The pixels whose samples may be fireflies.
     fn bright(&self, step: u32) -> Vec<Bright> {
         let places = (0..self.rows).flat_map(|y| (0..self.columns).map(move |x| (x, y)));
         let bright = places.filter(|&(x, y)| self.is_bright(x, y)).map(|(x, y)| {
             #[expect(clippy::cast_possible_truncation, reason = "columns and rows of a picture")]
             let pixel = (x as u32 * step, y as u32 * step);
-            Bright { pixel, light: self.each[y * self.columns + x].light }
+            Bright { pixel, light: self.at(x, y).light }
         });
         bright.collect()
     }
@@ -287,7 +311,7 @@ impl Grid {
     fn is_bright(&self, x: usize, y: usize) -> bool {
         /// Less than so many beside it are no wide thing that is seen in each of some pixels.
         const FEW: usize = 3;
-        let Asked { light, by_chance } = self.each[y * self.columns + x];
+        let Asked { light, by_chance } = self.at(x, y);
         let rows = y.saturating_sub(1)..(y + 2).min(self.rows);
         let near = rows.flat_map(|y| {
             let columns = x.saturating_sub(1)..(x + 2).min(self.columns);
@@ -306,7 +330,7 @@ fn in_cells(asked: &[Grid], side: usize) -> (Vec<Told>, usize) {
     let mut told = vec![Told::default(); columns * rows];
     for grid in asked {
         for (y, x) in (0..grid.rows).flat_map(|y| (0..grid.columns).map(move |x| (y, x))) {
-            let Asked { light, by_chance } = grid.each[y * grid.columns + x];
+            let Asked { light, by_chance } = grid.at(x, y);
             if by_chance {
                 let cell = &mut told[y / side * columns + x / side];
                 cell.samples += 1;
@@ -329,10 +353,14 @@ impl Fireflies {
         // Threads answer in any order; sums have one.
         each.sort_unstable_by(|one, other| (one.pixel.cmp(&other.pixel)).then(one.light.total_cmp(&other.light)));
         let (mut told, columns, rows) = (told.clone(), *columns, told.len() / (*columns).max(1));
-        for Bright { pixel: (x, y), light } in each {
+        for of_pixel in each.chunk_by(|one, next| one.pixel == next.pixel) {
+            let (x, y) = of_pixel[0].pixel;
             let cell = &mut told[(y / CELL) as usize * columns + (x / CELL) as usize];
-            cell.bright += f64::from(light);
-            cell.fireflies += 1;
+            cell.pixels += 1;
+            for Bright { light, .. } in of_pixel {
+                cell.bright += f64::from(*light);
+                cell.fireflies += 1;
+            }
         }
         let around = |i: usize, reach: usize| {
             let near = |at: usize, end: usize| at.saturating_sub(reach)..(at + reach + 1).min(end);
@@ -342,7 +370,7 @@ impl Fireflies {
         let cells = (0..told.len()).map(|i| {
             // One in a cell may be the only one for many cells around.
             let known = (0..=REACH).map(|reach| (around(i, reach), FEWEST[reach]));
-            let known = known.filter(|(told, fewest)| told.fireflies >= *fewest).map(|(told, _)| told);
+            let known = known.filter(|(told, fewest)| told.pixels >= *fewest).map(|(told, _)| told);
             let missed = known.map(|told| missing(told.mean(told.light), told.mean(told.bright))).fold(0.0, f32::max);
             if missed <= most {
                 return Cell { missed, ..Cell::default() };
@@ -410,6 +438,16 @@ mod tests {
     }
 
     #[test]
+    fn what_a_pixel_shows_again_and_again_is_no_firefly_however_many_of_its_samples_were_looked_at() {
+        let all = |bright: usize, of: usize| (0..of).map(|k| if k < bright { 8.0 } else { 0.1 }).collect::<Vec<f32>>();
+        // One before and sixteen after, or sixteen and sixteen: it, and two of sixteen others, or three of thirty-one.
+        for (of, most) in [(17, 3), (32, 4)] {
+            assert!(is_rare(8.0, &all(1, of)) && is_rare(30.0, &all(most, of)), "{of}");
+            assert!(!is_rare(30.0, &all(most + 1, of)), "{of}");
+        }
+    }
+
+    #[test]
     fn pixels_hear_of_fireflies_in_their_cell_and_two_cells_around_it() {
         let (bright, told) = (|x, y, light| Bright { pixel: (x, y), light }, Told { samples: 256, ..Told::default() });
         let each = vec![bright(180, 6, 4.0), bright(16, 6, 30.0), bright(24, 18, 50.0)];
@@ -423,12 +461,13 @@ mod tests {
     #[test]
     fn fireflies_count_where_without_them_pixels_would_be_too_dark() {
         let told = Told { samples: 256, light: 25.6, ..Told::default() };
-        let of = |fireflies: u32, least: f32| {
-            let each = (0..fireflies).map(|i| Bright { pixel: (70 + i, 7), light: 10.0 });
+        let of_pixels = |fireflies: u32, apart: u32, least: f32| {
+            let each = (0..fireflies).map(|i| Bright { pixel: (70 + i * apart, 7), light: 10.0 });
             let missing = |light: f32, more: f32| if (light - 0.1).abs() < 1e-6 { more } else { 0.0 };
             let found = Fireflies::among(each.collect(), &(vec![told; 5], 5), missing, least);
             [0, 32, 64].map(|x| (found.at((x, 0)), found.missed_at((x, 0))))
         };
+        let of = |fireflies: u32, least: f32| of_pixels(fireflies, 1, least);
         // Of five cells in a row all are near the middle one, three next to it.
         let mean = |fireflies: f32, tiles: f32| fireflies * 10.0 / (256.0 * tiles);
         assert_eq!(of(1, 0.99 * mean(1.0, 5.0)), [(10.0, 0.0); 3], "anywhere");
@@ -436,5 +475,7 @@ mod tests {
         assert_eq!(of(4, 1.01 * missed), [(0.0, missed), (0.0, missed), (10.0, 0.0)], "in their cell alone");
         let missed = mean(2.0, 3.0);
         assert_eq!(of(2, 1.01 * missed), [(0.0, missed); 3], "two tell nothing of a cell");
+        let missed = [3.0, 4.0, 5.0].map(|tiles| (0.0, mean(4.0, tiles)));
+        assert_eq!(of_pixels(4, 0, 1.01 * missed[0].1), missed, "nor does one pixel, however many it shows");
     }
 }

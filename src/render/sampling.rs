@@ -228,10 +228,23 @@ pub struct Targeted {
 }
 
 impl Sampled {
-    /// Rays of a pixel on the average; 0 without pixels.
+    /// Eye rays for each pixel on the average, whatever they were sent for; 0 without pixels.
     #[expect(clippy::cast_precision_loss, reason = "a ratio")]
     pub fn mean(&self) -> f64 {
         self.rays as f64 / self.pixels.max(1) as f64
+    }
+
+    /// Eye rays that the picture was made of: all but those that found out how many, or were traced again for another tile.
+    pub fn own(&self) -> u64 {
+        let each: u64 = self.counts.iter().copied().map(u64::from).sum();
+        // Shared ones count for several pixels.
+        if self.counts.is_empty() { self.rays } else { each.min(self.rays) }
+    }
+
+    /// Samples of a pixel on the average; 0 without pixels.
+    #[expect(clippy::cast_precision_loss, reason = "a ratio")]
+    pub fn samples(&self) -> f64 {
+        self.own() as f64 / self.pixels.max(1) as f64
     }
 
     /// Most rays of a pixel.

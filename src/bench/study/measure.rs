@@ -85,7 +85,7 @@ pub(super) fn measure(subject: &Subject, plan: &Plan, reference: &Reference, set
         // Where the system does not tell the time of processors, that on the wall has to do.
         cpu.push(if spent.cpu.is_zero() { spent.wall } else { spent.cpu }.as_secs_f64());
         wall.push(spent.wall.as_secs_f64());
-        samples = rendered.sampled.mean();
+        samples = rendered.sampled.samples();
         pictures.push(codes(&rendered.picture, subject));
     }
     let error = error(reference, &pictures);

@@ -70,7 +70,8 @@ pub(in crate::cli) struct RenderArgs {
     #[arg(long, value_name = "NAME", value_parser = parse::named::<ToneMap>(), help_heading = "Output",
           hide_short_help = true)]
     pub tone_map: Option<ToneMap>,
-    /// Brighter (+) or darker (-) by this many stops; not for EXR, which keeps light as it is
+    /// Brighter (+) or darker (-) by this many stops, but for the walls behind lamps in lux and candela; not for EXR, which
+    /// keeps light as it is
     #[arg(long, value_name = "STOPS", value_parser = parse::exposure, help_heading = "Output", allow_hyphen_values = true)]
     pub exposure: Option<f32>,
     /// Put all inputs into one scene and one picture
