@@ -50,6 +50,52 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # A picture of one's own, as good as is asked
+//! A mesh that was made in memory, a camera, a lamp, and how wrong the picture is at most:
+//! ```
+//! use meshray::accel::{AccelChoice, AccelParams};
+//! use meshray::image::{Output, rgba8};
+//! use meshray::math::{DAffine3, DVec3, Vec3};
+//! use meshray::render::{Job, Lens, Quality, Sampling, Settings, TextureStore, View, World, render};
+//! use meshray::scene::{Environment, Instance, Light, LightKind, Material, Mesh, Scene};
+//!
+//! // A pyramid without a floor.
+//! let rim = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| Vec3::new(x, y, 0.0));
+//! let pyramid = Mesh {
+//!     positions: [Vec3::Z].into_iter().chain(rim).collect(),
+//!     triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]],
+//!     ..Mesh::default()
+//! };
+//! let sun = LightKind::Directional { direction: DVec3::new(0.0, 1.0, -1.0).normalize() };
+//! let scene = Scene {
+//!     materials: vec![Material::plain()],
+//!     meshes: vec![pyramid],
+//!     instances: vec![Instance { name: "pyramid".into(), mesh: 0, world_from_object: DAffine3::IDENTITY }],
+//!     lights: vec![Light { name: "sun".into(), intensity: Vec3::splat(3.0), kind: sun, shadows: true, size: 0.02 }],
+//!     environment: Environment::Constant(Vec3::splat(0.1)),
+//!     ..Scene::default()
+//! };
+//! scene.check()?;
+//!
+//! let settings =
+//!     Settings { width: 64, height: 48, sampling: Sampling::Stochastic(Quality::Draft.stochastic()), ..Settings::default() };
+//! settings.validate()?;
+//! let view = View::look_at(DVec3::new(0.0, -4.0, 2.0), DVec3::ZERO, DVec3::Z, Lens::perspective(0.6));
+//! let world = World::new(&scene);
+//! let (accel, _) = world.structure(AccelChoice::Auto, &AccelParams::DEFAULT);
+//! let textures = TextureStore::new(&scene);
+//! let job = Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view: &view, settings: &settings };
+//! let rendered = render(&job, &());
+//!
+//! let error = rendered.sampled.rmse().expect("stochastic sampling knows");
+//! assert!(error < 0.1, "a bound on the root of the mean squared error");
+//! let pixels = rgba8(&rendered.picture, &Output::default());
+//! assert!(pixels[30 * 64 + 32][0] > 100, "the side that the sun shines on");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//! In a program that is not optimised this takes ten times as long; the README says how to have the library optimised all the
+//! same.
+//!
 //! # Rays of one's own
 //! A mesh that was made in memory, what rays hit of it, and how many tests that took:
 //! ```

@@ -6,6 +6,9 @@
 //! vertices (`math::triangle`), t is a pure function of (ray, prim), and culling is conservative by the margins that
 //! `math::bounds` derives.
 //!
+//! That holds for rays and shapes within ±1e27: distances to spheres and cones that are farther away overflow on the way, in one
+//! structure sooner than in another.
+//!
 //! Rays come in waves: slices of rays in, slices of answers out. Behind the interface a structure may trace them one by
 //! one, with many in flight, or as packets, with the same bits in the answer.
 

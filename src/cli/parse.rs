@@ -13,7 +13,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 /// Longest side of a picture.
-pub(super) const MAX_SIDE: u32 = 65_535;
+pub(super) const MAX_SIDE: u32 = crate::render::Settings::MOST_SIDE;
 
 /// `--ortho` as typed.
 #[derive(Clone, Copy, Debug, PartialEq)]

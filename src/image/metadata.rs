@@ -18,6 +18,9 @@ use std::path::Path;
 /// Longest text taken from a file, in bytes.
 pub const MAX_TEXT: usize = 1 << 20;
 
+/// Longest key: as PNG has it.
+const LONGEST_KEY: usize = 79;
+
 /// What every key begins with; other entries of a file are ignored.
 pub const PREFIX: &str = "meshray:";
 
@@ -47,7 +50,8 @@ impl Metadata {
         Self::default().with(Self::VERSION, env!("CARGO_PKG_VERSION"))
     }
 
-    /// Adds or replaces an entry. `key` begins with [`PREFIX`] and is at most 79 letters of printable ASCII.
+    /// Adds or replaces an entry. `key` begins with [`PREFIX`] and is at most 79 letters of printable ASCII; one that is not is
+    /// no entry, and changes nothing.
     #[must_use]
     pub fn with(mut self, key: &'static str, value: impl Into<String>) -> Self {
         self.insert(key, &value.into());
@@ -76,7 +80,8 @@ impl Metadata {
 
     /// Takes an entry if its key is ours. No format can hold a zero byte.
     pub(super) fn insert(&mut self, key: &str, value: &str) {
-        if key.starts_with(PREFIX) {
+        let is_printable = key.bytes().all(|byte| byte.is_ascii_graphic() || byte == b' ');
+        if key.starts_with(PREFIX) && key.len() <= LONGEST_KEY && is_printable {
             self.entries.insert(key.to_owned(), value.replace('\0', "\u{fffd}"));
         }
     }
@@ -166,6 +171,19 @@ mod tests {
             let path = write(&dir, "picture", &bytes);
             assert_eq!(read_metadata(&path).unwrap(), Some(sample()), "{kind}");
             assert!(was_written_by_meshray(&path), "{kind}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_key_of_ours_is_no_entry() {
+        let long: &'static str = Box::leak(format!("{PREFIX}{}", "k".repeat(LONGEST_KEY)).into_boxed_str());
+        for key in ["author", "meshray:ä", "meshray:\n", long] {
+            assert!(Metadata::default().with(key, "x").is_empty(), "{key}");
+        }
+        let longest: &'static str = &long[..LONGEST_KEY];
+        let metadata = Metadata::default().with(longest, "x");
+        for kind in FileKind::ALL {
+            assert!(encode(&picture(), kind, &Output::default(), &metadata).is_ok(), "{kind}");
         }
     }
 

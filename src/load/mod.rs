@@ -226,8 +226,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     Ok(loaded)
 }
 
-/// Loads a model or scene from memory. Files it names are looked up beside `name`; for `-` in
-/// [`LoadOptions::root`], or else in the current folder.
+/// Loads a model or scene from memory. Files it names are looked up beside `name`, which need not be there; for `-` in
+/// [`LoadOptions::root`]. A name without a folder stands for one in the current folder: where nothing is to be read but these
+/// bytes, the root is an empty folder and the name `-`.
 pub fn load_bytes(name: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let mut loaded = load_source(&Source { path: name.into(), bytes }, options)?;
     check_wishes(&loaded, name, options)?;
@@ -296,7 +297,8 @@ fn load_within(source: &Source, options: &LoadOptions, budget: &mut Budget) -> R
         LoadError::from(Diagnostic::over_memory(&source.path, "", format!("{what} too large: {over}")))
     };
     budget.take(source.bytes.len() as u64, 1).map_err(|over| too_large("the file is", over))?;
-    let mut loaded = match detect::detect(source)? {
+    let format = detect::detect(source)?;
+    let mut loaded = match format {
         detect::Format::Gltf => gltf::load(source, options, budget),
         detect::Format::Nff => nff::load(source, options, budget),
         detect::Format::Obj => obj::load(source, options, budget),
@@ -307,6 +309,10 @@ fn load_within(source: &Source, options: &LoadOptions, budget: &mut Budget) -> R
     if let Some(angle) = options.smooth {
         smooth::smooth(&mut loaded.scene, angle, budget).map_err(|over| too_large("smooth normals are", over))?;
         tangents::generate_left(&mut loaded.scene);
+    }
+    // Others have no transforms.
+    if matches!(format, detect::Format::Gltf | detect::Format::SceneFile) {
+        place::leave_out_far(&mut loaded, &source.path);
     }
     Ok(loaded)
 }

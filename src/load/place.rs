@@ -1,10 +1,11 @@
 //! Coordinates in `f64` -> a centre in `f64` and coordinates around it in `f32`.
 
-use super::{Diagnostic, Warnings};
+use super::{Diagnostic, Loaded, Warnings};
 use crate::math::frame::{center_of_most, spread};
 use crate::math::{DVec3, Vec3};
-use crate::scene::Mesh;
+use crate::scene::{Instance, Mesh, Scene};
 use rayon::prelude::*;
+use std::cell::OnceCell;
 use std::path::Path;
 
 /// Rounded positions, relative to `center`.
@@ -17,12 +18,32 @@ pub(super) struct Placed {
     pub max_rounding: f64,
 }
 
-/// Larger coordinates count as infinite, so that sums and products of a few of them stay within `f32`'s range.
-const LARGEST: f64 = 1e18;
-
 /// Whether a place or size is finite and not so large that it counts as infinite.
 pub(super) fn is_usable(p: DVec3) -> bool {
-    p.is_finite() && p.abs().max_element() <= LARGEST
+    p.is_finite() && p.abs().max_element() <= Scene::LARGEST
+}
+
+/// Leaves out instances of which any part is placed where coordinates count as infinite.
+pub(super) fn leave_out_far(loaded: &mut Loaded, file: &Path) {
+    let meshes = &loaded.scene.meshes;
+    let ends: Vec<OnceCell<[DVec3; 2]>> = vec![OnceCell::new(); meshes.len()];
+    let is_near = |instance: &Instance| {
+        // What is neither moved nor made larger by its transform need not be measured: each coordinate was looked at.
+        let (matrix, mesh) = (instance.world_from_object.matrix3, instance.mesh as usize);
+        let largest = matrix.transpose().to_cols_array_2d().map(|row| row.iter().map(|x| x.abs()).sum::<f64>());
+        let is_no_larger = largest.iter().all(|&times| times <= 1.0);
+        is_no_larger && instance.world_from_object.translation == DVec3::ZERO
+            || instance.reaches(*ends[mesh].get_or_init(|| meshes[mesh].around())).all(is_usable)
+    };
+    let before = loaded.scene.instances.len();
+    let far = loaded.scene.instances.iter().find(|instance| !is_near(instance)).map(|far| far.name.clone());
+    let Some(name) = far else { return };
+    loaded.scene.instances.retain(is_near);
+    let count = before - loaded.scene.instances.len();
+    let text = "an object is left out: its transform places it over 1e18 away";
+    let warning =
+        Diagnostic::new(LeftOut::TOO_FAR.code, file, if name.is_empty() { name } else { format!("'{name}'") }, text);
+    loaded.warnings.push(Diagnostic { count: u32::try_from(count).unwrap_or(u32::MAX), ..warning });
 }
 
 /// Why a shape cannot be placed.
@@ -126,6 +147,33 @@ mod tests {
         let placed = place(&far);
         assert!((placed.center.x - 1e7).abs() < 1.0);
         assert!(placed.max_rounding > 0.0 && placed.max_rounding < 1e-8, "{}", placed.max_rounding);
+    }
+
+    #[test]
+    fn objects_that_transforms_place_too_far_away_are_left_out_and_told() {
+        use crate::math::DAffine3;
+        let mesh = |far: f32| Mesh { positions: vec![Vec3::ZERO, Vec3::splat(far)], ..Mesh::default() };
+        let of = |name: &str, mesh, world_from_object| Instance { name: name.into(), mesh, world_from_object };
+        let scaled = |by: f64| DAffine3::from_scale(DVec3::new(1.0, by, 1.0));
+        let moved = |by: f64| DAffine3::from_translation(DVec3::Z * by);
+        let instances = vec![
+            of("as it is", 0, DAffine3::IDENTITY),
+            of("large", 0, scaled(1e18)),
+            of("larger", 0, scaled(2e18)),
+            of("far", 1, moved(0.9e18)),
+            of("farther", 1, moved(-1.1e18)),
+            of("nowhere", 0, moved(f64::NAN)),
+            of("far and large", 1, scaled(1e9)),
+        ];
+        let mut loaded = Loaded::default();
+        loaded.scene = Scene { meshes: vec![mesh(1.0), mesh(1e10)], instances, ..Scene::default() };
+        leave_out_far(&mut loaded, "a.glb".as_ref());
+        let left: Vec<&str> = loaded.scene.instances.iter().map(|instance| instance.name.as_str()).collect();
+        assert_eq!(left, ["as it is", "large", "far"]);
+        let [told] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings) };
+        assert_eq!((told.code, told.place.as_str(), told.count), ("shape-too-far", "'larger'", 4));
+        leave_out_far(&mut loaded, "a.glb".as_ref());
+        assert_eq!(loaded.warnings.len(), 1);
     }
 
     #[test]

@@ -74,7 +74,8 @@ pub use observer::{Asked, Question, Tape};
 pub use profile::{Profile, render_profiled};
 pub use sampling::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Split, Stochastic, Targeted};
 pub use surface::given_normal;
-pub use view::View;
+pub use texture::TextureStore;
+pub use view::{Lens, View};
 pub use world::{Moved, Placing, PrimSource, World};
 
 use crate::accel::{AnyAccel, NoProbe, RayCounts};
@@ -83,7 +84,6 @@ use crate::scene::Scene;
 use context::Context;
 use fireflies::Closely;
 use observer::Observer;
-use texture::TextureStore;
 
 /// Classes of rays as they are typed and printed, in the order of counts.
 pub const CLASS_NAMES: [&str; 4] = ["primary", "shadow", "reflected", "refracted"];
@@ -120,14 +120,37 @@ pub struct Settings {
     pub walls: f32,
     /// Whether [`crate::image::Layers`] are wanted.
     pub layers: bool,
-    /// Whether each point of a surface is shaded by itself and none beside others: the same picture, later, to compare.
+    /// For measurements: whether each point of a surface is shaded by itself and none beside others; the same picture, later.
     pub one_by_one: bool,
-    /// Whether what the scene does without is done all the same, for nothing (see [`everything`]). The world and the
+    /// For measurements: whether what the scene does without is done all the same, for nothing (see [`everything`]). The world and the
     /// textures of the [`Job`] must be such, too.
     pub everything: bool,
 }
 
 impl Settings {
+    /// Most columns, and rows.
+    pub const MOST_SIDE: u32 = 65_535;
+    /// Most samples a pixel of uniform sampling, and rays to lights, to surroundings and over rough surfaces.
+    pub const MOST_RAYS: u32 = 65_536;
+
+    /// Whether sizes and numbers of rays are within what the command line takes. Whether there is memory for the picture is
+    /// another matter: a pixel takes tens of bytes, of adaptive sampling some hundred.
+    ///
+    /// # Errors
+    ///
+    /// The first that is not.
+    pub fn validate(&self) -> Result<(), SettingsError> {
+        let within = |name, value: u32, least: u32, most: u32| {
+            (least..=most).contains(&value).then_some(()).ok_or(SettingsError { name, value, least, most })
+        };
+        within("width", self.width, 1, Self::MOST_SIDE)?;
+        within("height", self.height, 1, Self::MOST_SIDE)?;
+        within("samples", self.samples, 1, Self::MOST_RAYS)?;
+        within("light_rays", self.light_rays, 0, Self::MOST_RAYS)?;
+        within("env_rays", self.env_rays.unwrap_or(0), 0, Self::MOST_RAYS)?;
+        within("gloss_rays", self.gloss_rays.unwrap_or(0), 0, Self::MOST_RAYS)
+    }
+
     /// Rays that the eye sends at least.
     pub fn fewest_eye_rays(&self) -> u64 {
         let samples = match self.sampling {
@@ -164,6 +187,16 @@ impl Default for Settings {
             everything: false,
         }
     }
+}
+
+/// A number of [`Settings`] that is not within its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{name} is {value}: it must be {least} to {most}")]
+pub struct SettingsError {
+    name: &'static str,
+    value: u32,
+    least: u32,
+    most: u32,
 }
 
 /// Counts of a counted run.
@@ -222,6 +255,11 @@ pub struct Rendered {
 }
 
 /// Renders on all threads of the current rayon pool.
+///
+/// # Panics
+///
+/// Where the parts of the job belong to different scenes, the scene is not sound ([`Scene::check`]), or there is no memory for
+/// a picture of that size and so many rays ([`Settings::validate`]). A picture without pixels is none.
 pub fn render(job: &Job, progress: &dyn Progress) -> Rendered {
     render_with::<NoProbe>(job, progress, || {}).0
 }

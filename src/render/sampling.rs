@@ -309,6 +309,17 @@ mod tests {
     }
 
     #[test]
+    fn samples_of_a_picture_are_those_of_its_pixels_and_not_what_was_looked_with() {
+        let counts = vec![4, 8, 2, 2];
+        let of = |counts, rays| Sampled { pixels: 4, counts, rays, looked: rays / 2, ..Sampled::default() };
+        let stochastic = of(counts.clone(), 100);
+        assert_eq!((stochastic.own(), stochastic.samples(), stochastic.most()), (16, 4.0, 8));
+        assert_eq!(stochastic.mean(), 25.0);
+        assert_eq!(of(counts, 12).own(), 12, "adaptive sampling shares rays");
+        assert_eq!(of(Vec::new(), 36).samples(), 9.0, "uniform sampling counts none");
+    }
+
+    #[test]
     fn a_better_quality_asks_for_less_error() {
         let errors = Quality::ALL.iter().map(|q| q.stochastic().error).collect::<Vec<_>>();
         assert!(errors.windows(2).all(|pair| pair[0] > pair[1]), "{errors:?}");

@@ -14,8 +14,9 @@ pub struct SceneFault {
 }
 
 impl Scene {
-    /// Whether every index points at what is there, and arrays that belong together are equally long. Scenes from [`load`] are
-    /// sound; who builds one by hand asks before it is placed, since [`World`] and renderer rely on it.
+    /// Whether every index points at what is there, arrays that belong together are equally long, and every shape is finite and
+    /// within [`Self::LARGEST`]. Scenes from [`load`] are sound; who builds one by hand asks before it is placed, since
+    /// [`World`], structures and renderer rely on it.
     ///
     /// # Errors
     ///
@@ -28,30 +29,37 @@ impl Scene {
         for (i, mesh) in self.meshes.iter().enumerate() {
             mesh.check(&format!("meshes[{i}]"), materials)?;
         }
+        let boxes: Vec<[DVec3; 2]> = self.meshes.iter().map(Mesh::around).collect();
         for (i, instance) in self.instances.iter().enumerate() {
             points(|| format!("instances[{i}].mesh"), instance.mesh, self.meshes.len(), "meshes")?;
+            let (to_world, place) = (instance.world_from_object, || format!("instances[{i}].world_from_object"));
+            holds(to_world.is_finite(), place, || "it is not finite".into())?;
+            instance.reaches(boxes[instance.mesh as usize]).try_for_each(|corner| is_within(place, corner))?;
         }
         for (i, sphere) in self.spheres.iter().enumerate() {
             points(|| format!("spheres[{i}].material"), sphere.material, materials, "materials")?;
             let (radius, place) = (sphere.radius, || format!("spheres[{i}].radius"));
             holds(radius > 0.0 && radius.is_finite(), place, || format!("{radius} is none"))?;
-            is_finite(|| format!("spheres[{i}].center"), sphere.center)?;
+            is_near(place, radius)?;
+            is_within(|| format!("spheres[{i}].center"), sphere.center)?;
         }
         for (i, cone) in self.cones.iter().enumerate() {
             points(|| format!("cones[{i}].material"), cone.material, materials, "materials")?;
             let (radii, place) = ([cone.base_radius, cone.apex_radius], || format!("cones[{i}]"));
             let are_radii = radii.iter().all(|&radius| radius >= 0.0 && radius.is_finite()) && radii != [0.0; 2];
             holds(are_radii, place, || format!("{radii:?} are no radii"))?;
-            is_finite(|| format!("cones[{i}].base"), cone.base)?;
-            is_finite(|| format!("cones[{i}].apex"), cone.apex)?;
+            is_near(place, radii[0].max(radii[1]))?;
+            is_within(|| format!("cones[{i}].base"), cone.base)?;
+            is_within(|| format!("cones[{i}].apex"), cone.apex)?;
             holds(cone.base != cone.apex, place, || format!("both ends are at {}", cone.base))?;
         }
         for (i, plane) in self.planes.iter().enumerate() {
             points(|| format!("planes[{i}].material"), plane.material, materials, "materials")?;
             let (length, place) = (plane.normal.length(), || format!("planes[{i}].normal"));
             holds((length - 1.0).abs() < 1e-6, place, || format!("its length is {length}, not 1"))?;
-            let offset = plane.offset;
-            holds(offset.is_finite(), || format!("planes[{i}].offset"), || format!("{offset} is not finite"))?;
+            let (offset, place) = (plane.offset, || format!("planes[{i}].offset"));
+            holds(offset.is_finite(), place, || format!("{offset} is not finite"))?;
+            is_near(place, offset)?;
         }
         for (i, material) in self.materials.iter().enumerate() {
             for map in material.textures() {
@@ -77,6 +85,10 @@ impl Scene {
         holds(self.prims() <= Self::MOST_PRIMS, || "instances".into(), text)
     }
 
+    /// The largest size of a coordinate or radius, world units: sums and products of a few of them stay within the range of
+    /// `f32`. Loaders leave out what is larger.
+    pub const LARGEST: f64 = 1e18;
+
     /// The most prims that can be told apart: the last number of 32 bits means none.
     pub const MOST_PRIMS: u64 = u32::MAX as u64 - 1;
 
@@ -89,9 +101,28 @@ impl Scene {
     }
 }
 
+impl Instance {
+    /// Where it places the corners of a box around its mesh.
+    pub(crate) fn reaches(&self, ends: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
+        let corners = (0..8).map(move |k| DVec3::from_array([0, 1, 2].map(|axis| ends[k >> axis & 1][axis])));
+        let to_world = self.world_from_object;
+        corners.map(move |corner| to_world.transform_point3(corner))
+    }
+}
+
 impl Mesh {
+    /// The least and the greatest coordinates of its corners; 0 where it has none.
+    pub(crate) fn around(&self) -> [DVec3; 2] {
+        let Some(first) = self.positions.first() else { return [DVec3::ZERO; 2] };
+        let ends = self.positions.iter().fold([*first; 2], |[lo, hi], position| [lo.min(*position), hi.max(*position)]);
+        ends.map(|end| end.as_dvec3())
+    }
+
     fn check(&self, place: &str, materials: usize) -> Result<(), SceneFault> {
         points(|| format!("{place}.material"), self.material, materials, "materials")?;
+        for (i, &position) in self.positions.iter().enumerate() {
+            holds(position.is_finite(), || format!("{place}.positions[{i}]"), || format!("{position} is not finite"))?;
+        }
         let positions = self.positions.len();
         let sets = self.uvs.iter().enumerate().map(|(k, set)| (format!("uvs[{k}]"), set.len()));
         let attributes = [
@@ -143,8 +174,15 @@ fn covers(place: impl Fn() -> String, found: usize, (width, height): (u32, u32))
     holds(found == expected, place, || format!("{found} texels where {width} × {height} are {expected}"))
 }
 
-fn is_finite(place: impl Fn() -> String, point: DVec3) -> Result<(), SceneFault> {
-    holds(point.is_finite(), place, || format!("{point} is not finite"))
+/// A coordinate or size is finite and not too large.
+fn is_near(place: impl Fn() -> String, size: f64) -> Result<(), SceneFault> {
+    holds(size.abs() <= Scene::LARGEST, place, || format!("{size:e} is over {:e}", Scene::LARGEST))
+}
+
+/// So are those of a point.
+fn is_within(place: impl Fn() -> String, point: DVec3) -> Result<(), SceneFault> {
+    holds(point.is_finite(), &place, || format!("{point} is not finite"))?;
+    is_near(place, point.abs().max_element())
 }
 
 fn holds(is_so: bool, place: impl Fn() -> String, text: impl Fn() -> String) -> Result<(), SceneFault> {
@@ -217,7 +255,7 @@ mod tests {
     fn what_points_nowhere_or_is_too_short_is_named_with_its_place() {
         assert_eq!(sound().check(), Ok(()));
         assert_eq!(Scene::default().check(), Ok(()));
-        let faults: [(Spoil, &str); 22] = [
+        let faults: [(Spoil, &str); 26] = [
             (|s| s.meshes[0].material = 1, "meshes[0].material: 1 where there are 1 materials"),
             (|s| s.meshes[0].triangles.push([0, 1, 3]), "meshes[0].triangles[1]: 3 where there are 3 positions"),
             (|s| s.meshes[0].normals.truncate(2), "meshes[0].normals: 2 of them where there are 3 positions"),
@@ -226,6 +264,13 @@ mod tests {
             (|s| s.meshes[0].polygons[0].first = u32::MAX, "meshes[0].polygons[0]: 3 corners from 4294967295 on"),
             (|s| s.meshes[0].polygon_corners[1] = 9, "meshes[0].polygon_corners[1]: 9 where"),
             (|s| s.instances[0].mesh = 1, "instances[0].mesh: 1 where there are 1 meshes"),
+            (|s| s.meshes[0].positions[1].y = f32::NAN, "meshes[0].positions[1]: [1, NaN, 0] is not finite"),
+            (
+                |s| s.instances[0].world_from_object.translation.z = f64::INFINITY,
+                "instances[0].world_from_object: it is not finite",
+            ),
+            (|s| s.instances[0].world_from_object.matrix3 *= 2e18, "instances[0].world_from_object: 2e18 is over 1e18"),
+            (|s| s.spheres[0].radius = 1e300, "spheres[0].radius: 1e300 is over 1e18"),
             (|s| s.spheres[0].radius = -1.0, "spheres[0].radius: -1 is none"),
             (|s| s.spheres[0].radius = 0.0, "spheres[0].radius: 0 is none"),
             (|s| s.spheres[0].center.y = f64::NAN, "spheres[0].center: [1, NaN, 0] is not finite"),

@@ -59,7 +59,7 @@ use self::walk::{OneByOne, Walk};
 use super::query::{Culling, Goal, Query};
 use super::wave::Wave;
 use super::{NoProbe, Probe, Shapes};
-use crate::math::simd::{Kernel, Level, Portable, WIDE};
+use crate::math::simd::{Kernel, Level, WIDE, portably};
 
 /// How the rays of a wave are traced. The answers are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -212,7 +212,7 @@ impl Wide<'_> {
         }
         let (tree, shapes) = (&self.tree(), self.shapes);
         let kernel = OneByOne { tree, shapes, wave, stack, probe, margins: PhantomData::<B> };
-        if Together::<W, P>::ON_EVERY_LEVEL { self.run_narrow::<B, _>(kernel) } else { kernel.run(Portable) }
+        if Together::<W, P>::ON_EVERY_LEVEL { self.run_narrow::<B, _>(kernel) } else { portably(kernel) }
     }
 
     fn trace_together<B: BoxMargins, W: Wave>(&self, wave: &mut W, stack: &mut Stack) {

@@ -8,7 +8,7 @@ use super::structure::AccelArgs;
 use super::words::{FileType, MessageFormat, StatsFormat};
 use crate::accel::{AccelChoice, IntersectorKind};
 use crate::image::ToneMap;
-use crate::render::{Cost, Instancing};
+use crate::render::{Cost, Instancing, Settings};
 use crate::scene::Background;
 use crate::scene::framing::NamedView;
 use clap::{ArgAction, Args};
@@ -146,13 +146,13 @@ pub(in crate::cli) struct RenderArgs {
           hide_short_help = true)]
     pub sun_size: Option<f64>,
     /// Shadow rays to each light that has an extent [default: 16]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536),
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_RAYS)),
           help_heading = "Light and background", hide_short_help = true)]
     pub light_rays: Option<u32>,
     /// Rays that each point sends to what surrounds the scene, to find what hides it; with --env white: ambient
     /// occlusion. If any, at least 2 in each way that the scene needs to draw them: by the cosine, for rough mirrors, for
     /// a panorama, through what is translucent [default: 16 for pictures, else 0: nothing hides it]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=65_536),
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(Settings::MOST_RAYS)),
           help_heading = "Light and background", hide_short_help = true)]
     pub env_rays: Option<u32>,
 
@@ -167,7 +167,7 @@ pub(in crate::cli) struct RenderArgs {
     pub cutoff: Option<f32>,
     /// Rays that a rough surface spreads over what it mirrors, and over what it lets through; 0: it sees its
     /// surroundings blurred by a formula, and nothing that stands in them [default: 4 for frosted glass, else 0]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=65_536), help_heading = "Quality",
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(Settings::MOST_RAYS)), help_heading = "Quality",
           hide_short_help = true)]
     pub gloss_rays: Option<u32>,
     /// Seed of every random choice

@@ -309,6 +309,13 @@ impl FromStr for Level {
     }
 }
 
+/// Runs a kernel's portable form, apart from where the others are called: without optimisation kernels have frames of a
+/// megabyte, and one that holds two of them is too large for the stacks of threads.
+#[inline(never)]
+pub(crate) fn portably<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run(Portable)
+}
+
 impl Level {
     /// What every machine has.
     pub const PORTABLE: Self = Self(Set::Portable);
@@ -373,7 +380,7 @@ impl Level {
     #[inline]
     pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
         match self.0 {
-            Set::Portable => kernel.run(Portable),
+            Set::Portable => portably(kernel),
             #[cfg(target_arch = "x86_64")]
             Set::Avx2(token) => token.run(kernel),
             #[cfg(target_arch = "x86_64")]
@@ -386,7 +393,7 @@ impl Level {
     /// Runs a kernel for which code for the widest lanes is not worth its size: AVX2 where there is AVX-512.
     #[inline]
     pub fn run_narrow<K: Kernel>(self, kernel: K) -> K::Output {
-        if self == Self::PORTABLE { kernel.run(Portable) } else { self.run_vectors(kernel) }
+        if self == Self::PORTABLE { portably(kernel) } else { self.run_vectors(kernel) }
     }
 
     /// Runs a kernel that is compiled for vectors alone, AVX2's or NEON's: the scalar form takes many times as long to

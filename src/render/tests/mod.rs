@@ -150,3 +150,22 @@ fn square(z: f32, half: f32) -> Mesh {
 fn assert_near(a: Vec3, b: Vec3, tolerance: f32) {
     assert!((a - b).length() <= tolerance, "{a} is not within {tolerance} of {b}");
 }
+
+#[test]
+fn settings_out_of_their_ranges_are_named_with_these() {
+    let valid = Settings::default();
+    assert_eq!(valid.validate(), Ok(()));
+    let largest = Settings { width: Settings::MOST_SIDE, gloss_rays: Some(Settings::MOST_RAYS), ..valid.clone() };
+    assert_eq!(largest.validate(), Ok(()));
+    let faults = [
+        (Settings { height: 0, ..valid.clone() }, "height is 0: it must be 1 to 65535"),
+        (Settings { width: u32::MAX, ..valid.clone() }, "width is 4294967295: it must be 1 to 65535"),
+        (Settings { samples: 0, ..valid.clone() }, "samples is 0: it must be 1 to 65536"),
+        (Settings { light_rays: 65_537, ..valid.clone() }, "light_rays is 65537: it must be 0 to 65536"),
+        (Settings { env_rays: Some(u32::MAX), ..valid.clone() }, "env_rays is 4294967295: it must be 0 to 65536"),
+        (Settings { gloss_rays: Some(65_537), ..valid }, "gloss_rays is 65537: it must be 0 to 65536"),
+    ];
+    for (settings, expected) in faults {
+        assert_eq!(settings.validate().unwrap_err().to_string(), expected);
+    }
+}

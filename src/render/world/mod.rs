@@ -115,7 +115,7 @@ impl World {
     ///
     /// # Panics
     ///
-    /// It may, with parameters that [`AccelParams::validate`] refuses.
+    /// It may, with parameters that [`AccelParams::validate`] refuses, and scenes that [`Scene::check`] does.
     pub fn structure(&self, choice: AccelChoice, params: &AccelParams) -> (AnyAccel<'_>, Option<Reason>) {
         self.structure_for(u64::MAX, choice, params)
     }
@@ -125,7 +125,7 @@ impl World {
     ///
     /// # Panics
     ///
-    /// It may, with parameters that [`AccelParams::validate`] refuses.
+    /// It may, with parameters that [`AccelParams::validate`] refuses, and scenes that [`Scene::check`] does.
     pub fn structure_for(
         &self,
         eye_rays: u64,
@@ -248,6 +248,12 @@ impl World {
     }
 
     /// The material of prim `prim`, an index into `scene.materials`.
+    ///
+    /// # Panics
+    ///
+    /// Where the scene has no such prim: that of [`Hit::MISS`] is none.
+    ///
+    /// [`Hit::MISS`]: crate::accel::Hit::MISS
     pub fn material(&self, scene: &Scene, prim: u32) -> u32 {
         match self.source(prim) {
             PrimSource::Triangle { instance, .. } | PrimSource::Polygon { instance, .. } => {
