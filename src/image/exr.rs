@@ -363,6 +363,7 @@ impl Channels<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ::exr::meta::attribute::IntegerBounds;
 
     fn picture() -> Picture {
         let n = 35_u32;
