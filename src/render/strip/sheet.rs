@@ -175,8 +175,9 @@ impl Sheet {
 impl Group {
     /// Reads what its maps say at so many of these spots; those of lobes and reflectance from `start` on, if they are wanted.
     #[inline(always)]
-    fn read(
+    fn read<S: Simd>(
         &self,
+        s: S,
         store: &TextureStore,
         (places, spots): (&mut Places, &Spots),
         (texels, points): (&mut Texels, usize),
@@ -188,6 +189,9 @@ impl Group {
                 continue;
             }
             places.find(&stack.layout, spots);
+            for map in stack.maps.iter().filter(|map| wanted(map)) {
+                places.prefetch(s, store, (map.texture, map.space));
+            }
             for Map { texture, space, slots, lobes } in stack.maps.iter().filter(|map| wanted(map)) {
                 let mut read = [Vec4::ONE; LANES];
                 places.read(store, (*texture, *space), &mut read[..points]);
@@ -339,7 +343,7 @@ impl Kernel for Read<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self, _: S) {
+    fn run<S: Simd>(self, s: S) {
         let Self {
             sheet,
             material,
@@ -362,12 +366,12 @@ impl Kernel for Read<'_> {
             let reads_lobes = !outside_alone || front[start..start + points].contains(&1);
             if let Some(group) = sheet.groups.first() {
                 spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.uvs(i));
-                group.read(store, (places, &spots), (&mut texels, points), (of_lobes, start, reads_lobes));
+                group.read(s, store, (places, &spots), (&mut texels, points), (of_lobes, start, reads_lobes));
             }
             for group in sheet.groups.iter().skip(1) {
                 let mut spots = Spots::default();
                 spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.other_uvs(i));
-                group.read(store, (places, &spots), (&mut texels, points), (of_lobes, start, reads_lobes));
+                group.read(s, store, (places, &spots), (&mut texels, points), (of_lobes, start, reads_lobes));
             }
             for i in start..start + points {
                 let vertex =

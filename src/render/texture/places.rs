@@ -6,7 +6,7 @@
 use super::pyramid::{self, Plane, Stored};
 use super::{ColorSpace, PROBES, TextureStore, apart, decode, doublings, pixels, probes, size_of};
 use crate::math::formula::{floor, integer};
-use crate::math::simd::LANES;
+use crate::math::simd::{LANES, Simd};
 use crate::math::{Vec2, Vec4};
 use crate::scene::{Filter, Mipmaps, Sampler, Wrap};
 use decode::Texels;
@@ -275,6 +275,21 @@ impl Places {
                 let above = above.get_or_insert_with(|| lookup.plane(level as usize + 1));
                 let upper = self.of_level(above, 1, i);
                 *to += (upper - *to) * self.share[i];
+            }
+        }
+    }
+
+    /// Fetches most of what [`Self::read`] will ask for: where all maps of a layout are fetched first, none waits for memory.
+    #[inline(always)]
+    pub(crate) fn prefetch<S: Simd>(&self, s: S, store: &TextureStore, (texture, space): (u32, ColorSpace)) {
+        let Some((sampler, source)) = store.find(texture) else { return };
+        let lookup = source.lookup(space, sampler);
+        for above in 0..=self.between[0] as usize {
+            let (plane, [upper, _, lower, _]) =
+                (lookup.plane(self.level[0] as usize + above), &self.taps[above][0].corners);
+            for i in (0..LANES).filter(|&i| self.level[i] == self.level[0]) {
+                plane.prefetch(s, upper[i] as usize);
+                plane.prefetch(s, lower[i] as usize);
             }
         }
     }

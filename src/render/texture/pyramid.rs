@@ -7,6 +7,7 @@
 use super::ColorSpace;
 use super::decode::{self, FRACTION, Texels};
 use crate::math::Vec4;
+use crate::math::simd::Simd;
 use crate::pages::Paged;
 use crate::scene::{Bitmap, Pixels};
 use std::sync::OnceLock;
@@ -125,6 +126,16 @@ impl Plane<'_> {
         match self.texels {
             Stored::Bitmap(texels) => texels.get(index),
             Stored::Level(texels) => unit(&texels[index]),
+        }
+    }
+
+    /// Fetches a texel that will be asked for.
+    #[inline(always)]
+    pub(super) fn prefetch<S: Simd>(&self, s: S, index: usize) {
+        match self.texels {
+            Stored::Level(texels) => s.prefetch(texels.get(index..=index).unwrap_or_default()),
+            Stored::Bitmap(Texels::Rgb8(texels, _)) => s.prefetch(texels.get(index..=index).unwrap_or_default()),
+            Stored::Bitmap(_) => {}
         }
     }
 
