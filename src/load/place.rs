@@ -165,8 +165,8 @@ mod tests {
             of("nowhere", 0, moved(f64::NAN)),
             of("far and large", 1, scaled(1e9)),
         ];
-        let mut loaded = Loaded::default();
-        loaded.scene = Scene { meshes: vec![mesh(1.0), mesh(1e10)], instances, ..Scene::default() };
+        let scene = Scene { meshes: vec![mesh(1.0), mesh(1e10)], instances, ..Scene::default() };
+        let mut loaded = Loaded { scene, ..Loaded::default() };
         leave_out_far(&mut loaded, "a.glb".as_ref());
         let left: Vec<&str> = loaded.scene.instances.iter().map(|instance| instance.name.as_str()).collect();
         assert_eq!(left, ["as it is", "large", "far"]);

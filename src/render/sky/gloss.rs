@@ -1,7 +1,7 @@
 //! What a rough surface mirrors of a panorama, without a ray: lookups along the directions that its facets send the view to.
 
 use super::lookups::{LOOKUPS, Lookups, Row};
-use super::panorama::{Pyramid, coordinates};
+use super::panorama::Pyramid;
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Level, Simd};
 use crate::render::optics::reflect;
@@ -78,9 +78,7 @@ impl<F: Fn(Vec3) -> Vec3> Kernel for Look<'_, F> {
             let dir = to_map(dir);
             (dirs[0][k], dirs[1][k], dirs[2][k]) = (dir.x, dir.y, dir.z);
         }
-        for k in 0..LOOKUPS {
-            (to.around[k], to.down[k]) = coordinates(Vec3::new(dirs[0][k], dirs[1][k], dirs[2][k]));
-        }
+        to.look_along(&dirs);
         to.mean(&sky.soft)
     }
 }
@@ -143,9 +141,7 @@ impl Kernel for LookAround<'_> {
             to.angle[k] = (1.0 / (LOOKUPS as f32 * density)).sqrt();
             (dirs[0][k], dirs[1][k], dirs[2][k]) = (light.x, light.y, light.z);
         }
-        for k in 0..LOOKUPS {
-            (to.around[k], to.down[k]) = coordinates(Vec3::new(dirs[0][k], dirs[1][k], dirs[2][k]));
-        }
+        to.look_along(&dirs);
         to.mean(&sky.levels)
     }
 }

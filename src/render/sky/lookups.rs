@@ -1,6 +1,6 @@
 //! Lookups of a panorama, each as blurred as it asks for, many side by side.
 
-use super::panorama::Level;
+use super::panorama::{Level, coordinates};
 use crate::math::formula::{floor, log2, near_integer};
 use crate::math::{Vec3, Vec4};
 
@@ -34,6 +34,14 @@ impl Lookups {
     /// None that counts.
     pub(super) const NONE: Self =
         Self { around: [0.0; LOOKUPS], down: [0.0; LOOKUPS], angle: [0.0; LOOKUPS], weight: [0.0; LOOKUPS] };
+
+    /// Sets their places by unit directions in the panorama's frame, by axis. For a kernel.
+    #[inline(always)]
+    pub(super) fn look_along(&mut self, [x, y, z]: &[Row; 3]) {
+        for k in 0..LOOKUPS {
+            (self.around[k], self.down[k]) = coordinates(Vec3::new(x[k], y[k], z[k]));
+        }
+    }
 
     /// Mean of all that count, each between the two of some `copies` whose texels are next to its width; `None` where none
     /// counts. For a kernel.
@@ -74,6 +82,7 @@ impl Taps {
     /// branches and casts, of which compilers make no lanes.
     #[inline(always)]
     #[expect(clippy::cast_precision_loss, reason = "sides are below 2²²")]
+    #[expect(clippy::needless_range_loop, reason = "of several arrays, side by side")]
     pub(super) fn find(&mut self, lookups: &Lookups, copies: &Row<u32>, [width, height]: [u32; 2]) {
         for k in 0..LOOKUPS {
             let wide = (width >> copies[k]).max(1).cast_signed();
