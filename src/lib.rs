@@ -140,6 +140,11 @@
 //! # Ok::<(), meshray::scene::SceneFault>(())
 //! ```
 //!
+//! # What borrows what
+//! A [`render::World`] holds all shapes by itself. Structures borrow it, and a [`render::TextureStore`] the scene: they are made
+//! where they are used, as above, and live for as long as a request, a command or a thread's scope. A program that keeps a mesh
+//! for as long as it runs lends it for ever: `let world: &'static World = Box::leak(Box::new(World::new(&scene)))`.
+//!
 //! # Modules
 //! | module | knows |
 //! |---|---|

@@ -7,7 +7,7 @@ use crate::math::Vec3;
 use crate::math::simd::{Level, UnknownLevel};
 use crate::named::{Named, UnknownName};
 use crate::render::{Cost, Tape};
-use crate::scene::{Background, Environment, MAX_DEPTH, MAX_STOPS};
+use crate::scene::{Background, Environment, MAX_DEPTH, MAX_STOPS, Scene};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::fmt;
 use std::path::PathBuf;
@@ -46,10 +46,16 @@ pub(super) fn cells(text: &str) -> Result<[u32; 3], String> {
     parts.and_then(|p| <[u32; 3]>::try_from(p).ok()).ok_or_else(|| "write three whole numbers, such as 46x46x3".into())
 }
 
-/// Three finite numbers.
+/// Three finite numbers, none larger than coordinates may be.
 pub(super) fn vec3(text: &str) -> Result<[f64; 3], String> {
     let parts: Option<Vec<f64>> = text.split(',').map(|p| finite(p).ok()).collect();
-    parts.and_then(|p| <[f64; 3]>::try_from(p).ok()).ok_or_else(|| "write three numbers, such as 1,0.5,-2".into())
+    let parts = parts.and_then(|p| <[f64; 3]>::try_from(p).ok()).ok_or("write three numbers, such as 1,0.5,-2")?;
+    let far = Scene::LARGEST;
+    if parts.iter().all(|x| x.abs() <= far) {
+        Ok(parts)
+    } else {
+        Err(format!("write numbers from -{far:e} to {far:e}"))
+    }
 }
 
 /// The same, not all 0.
@@ -397,7 +403,8 @@ mod tests {
     #[test]
     fn vectors_have_three_finite_parts() {
         assert_eq!(vec3("-1, 2.5,3e2"), Ok([-1.0, 2.5, 300.0]));
-        for wrong in ["1,2", "1,2,3,4", "1,2,nan", "inf,0,0", ""] {
+        assert_eq!(vec3("1e18,-1e18,0"), Ok([1e18, -1e18, 0.0]));
+        for wrong in ["1,2", "1,2,3,4", "1,2,nan", "inf,0,0", "", "1,1.1e18,0"] {
             assert!(vec3(wrong).is_err(), "{wrong}");
         }
         assert_eq!((direction("0,0,-1"), direction("0,-0,0").is_err()), (Ok([0.0, 0.0, -1.0]), true));
