@@ -93,7 +93,7 @@
 //! assert!(pixels[30 * 64 + 32][0] > 100, "the side that the sun shines on");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//! In a program that is not optimised this takes ten times as long; the README says how to have the library optimised all the
+//! In a program that is not optimised this takes many times as long; the README says how to have the library optimised all the
 //! same.
 //!
 //! # Rays of one's own

@@ -29,7 +29,8 @@ pub(super) struct SamplingArgs {
     pub quality: Option<Quality>,
     /// Exactly N rays a pixel, at the same places in each (--aa uniform). Costs of pixels (--layers tests, --heatmap) are
     /// always those of N rays, 4 when nothing is said
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_RAYS)), help_heading = "Quality")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_RAYS)),
+          help_heading = "Quality")]
     pub samples: Option<u32>,
     /// Error of a pixel that stochastic sampling stops at: root mean square over its channels, which run from 0 to 1 in the
     /// written picture. Half of it costs about two to three times the rays
@@ -48,7 +49,8 @@ pub(super) struct SamplingArgs {
     /// Fewest rays of a pixel of stochastic sampling, enough where they and those of its neighbours agree; the next power of
     /// two is taken. Light, gloss and environment rays are divided by it, by 4 at least [default: 1; 16 with
     /// --aperture, and for points and lines narrower than 2 pixels]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_RAYS)), help_heading = "Quality",
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_RAYS)),
+          help_heading = "Quality",
           hide_short_help = true)]
     pub min_samples: Option<u32>,
     /// Most rays of a pixel of stochastic sampling, certain or not; the power of two below is taken

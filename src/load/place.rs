@@ -3,6 +3,7 @@
 use super::{Diagnostic, Loaded, Warnings};
 use crate::math::frame::{center_of_most, spread};
 use crate::math::{DVec3, Vec3};
+use crate::scene::corners::{ObjectBox, placed_box};
 use crate::scene::{Instance, Mesh, Scene};
 use rayon::prelude::*;
 use std::cell::OnceCell;
@@ -26,14 +27,14 @@ pub(super) fn is_usable(p: DVec3) -> bool {
 /// Leaves out instances of which any part is placed where coordinates count as infinite.
 pub(super) fn leave_out_far(loaded: &mut Loaded, file: &Path) {
     let meshes = &loaded.scene.meshes;
-    let ends: Vec<OnceCell<[DVec3; 2]>> = vec![OnceCell::new(); meshes.len()];
+    let boxes: Vec<OnceCell<ObjectBox>> = vec![OnceCell::new(); meshes.len()];
     let is_near = |instance: &Instance| {
         // What is neither moved nor made larger by its transform need not be measured: each coordinate was looked at.
         let (matrix, mesh) = (instance.world_from_object.matrix3, instance.mesh as usize);
         let largest = matrix.transpose().to_cols_array_2d().map(|row| row.iter().map(|x| x.abs()).sum::<f64>());
         let is_no_larger = largest.iter().all(|&times| times <= 1.0);
         is_no_larger && instance.world_from_object.translation == DVec3::ZERO
-            || instance.reaches(*ends[mesh].get_or_init(|| meshes[mesh].around())).all(is_usable)
+            || placed_box(*boxes[mesh].get_or_init(|| meshes[mesh].around()), instance).into_iter().all(is_usable)
     };
     let before = loaded.scene.instances.len();
     let far = loaded.scene.instances.iter().find(|instance| !is_near(instance)).map(|far| far.name.clone());

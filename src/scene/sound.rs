@@ -1,7 +1,9 @@
 //! Whether a scene that was made by hand can be placed and rendered.
 
+use super::corners::{ObjectBox, placed_box};
 use super::{Instance, Mesh, Pixels, Scene};
-use crate::math::DVec3;
+use crate::math::aabb::Aabb;
+use crate::math::{DVec3, Vec3};
 
 /// What is wrong with a scene, and where.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -29,12 +31,13 @@ impl Scene {
         for (i, mesh) in self.meshes.iter().enumerate() {
             mesh.check(&format!("meshes[{i}]"), materials)?;
         }
-        let boxes: Vec<[DVec3; 2]> = self.meshes.iter().map(Mesh::around).collect();
+        let boxes: Vec<ObjectBox> = self.meshes.iter().map(Mesh::around).collect();
         for (i, instance) in self.instances.iter().enumerate() {
             points(|| format!("instances[{i}].mesh"), instance.mesh, self.meshes.len(), "meshes")?;
             let (to_world, place) = (instance.world_from_object, || format!("instances[{i}].world_from_object"));
             holds(to_world.is_finite(), place, || "it is not finite".into())?;
-            instance.reaches(boxes[instance.mesh as usize]).try_for_each(|corner| is_within(place, corner))?;
+            let corners = placed_box(boxes[instance.mesh as usize], instance);
+            corners.into_iter().try_for_each(|corner| is_within(place, corner))?;
         }
         for (i, sphere) in self.spheres.iter().enumerate() {
             points(|| format!("spheres[{i}].material"), sphere.material, materials, "materials")?;
@@ -101,21 +104,11 @@ impl Scene {
     }
 }
 
-impl Instance {
-    /// Where it places the corners of a box around its mesh.
-    pub(crate) fn reaches(&self, ends: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
-        let corners = (0..8).map(move |k| DVec3::from_array([0, 1, 2].map(|axis| ends[k >> axis & 1][axis])));
-        let to_world = self.world_from_object;
-        corners.map(move |corner| to_world.transform_point3(corner))
-    }
-}
-
 impl Mesh {
-    /// The least and the greatest coordinates of its corners; 0 where it has none.
-    pub(crate) fn around(&self) -> [DVec3; 2] {
-        let Some(first) = self.positions.first() else { return [DVec3::ZERO; 2] };
-        let ends = self.positions.iter().fold([*first; 2], |[lo, hi], position| [lo.min(*position), hi.max(*position)]);
-        ends.map(|end| end.as_dvec3())
+    /// The box of all its positions, used or not; of the origin where there are none.
+    pub(crate) fn around(&self) -> ObjectBox {
+        let Aabb { lo, hi } = Aabb::around(self.positions.iter().copied());
+        if self.positions.is_empty() { (Vec3::ZERO, Vec3::ZERO) } else { (lo, hi) }
     }
 
     fn check(&self, place: &str, materials: usize) -> Result<(), SceneFault> {
@@ -192,7 +185,7 @@ fn holds(is_so: bool, place: impl Fn() -> String, text: impl Fn() -> String) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DAffine3, DVec3, Vec2, Vec3};
+    use crate::math::{DAffine3, Vec2};
     use crate::scene::{
         Bitmap, Cone, Instance, Material, Panorama, Plane, Polygon, Sampler, Sphere, Texture, TextureRef, UvTransform,
     };

@@ -167,7 +167,8 @@ pub(in crate::cli) struct RenderArgs {
     pub cutoff: Option<f32>,
     /// Rays that a rough surface spreads over what it mirrors, and over what it lets through; 0: it sees its
     /// surroundings blurred by a formula, and nothing that stands in them [default: 4 for frosted glass, else 0]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(Settings::MOST_RAYS)), help_heading = "Quality",
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(Settings::MOST_RAYS)),
+          help_heading = "Quality",
           hide_short_help = true)]
     pub gloss_rays: Option<u32>,
     /// Seed of every random choice

@@ -20,8 +20,9 @@ pub(super) const EVEN: f64 = 0.1;
 #[derive(Clone, Debug)]
 pub(super) struct Chance {
     level: Level,
+    /// Of rows, by the light of each.
     rows: Sums,
-    /// Within each row, texels.
+    /// Of the texels of each row, by the light of each in that of the row.
     columns: Vec<Sums>,
     /// Cosines from the zenith of the upper edges of rows, and of the lower edge of the last.
     edges: Vec<f32>,

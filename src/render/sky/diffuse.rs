@@ -96,7 +96,7 @@ impl Kernel for Look<'_> {
         let (fine, between) = sky.level(*angle);
         let levels = [sky.copy(fine), sky.copy(fine + 1)];
         let mut taps = [Taps::NONE, Taps::NONE];
-        for (taps, level) in taps.iter_mut().zip(levels) {
+        for (taps, level) in taps.iter_mut().zip(levels).take(1 + usize::from(between > 0.0)) {
             taps.find(lookups, &[0; LOOKUPS], [level.width, level.height]);
         }
         let ([mut red, mut green, mut blue], mut even) = ([Vec4::ZERO; 3], Vec4::ZERO);

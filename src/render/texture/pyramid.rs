@@ -129,7 +129,7 @@ impl Plane<'_> {
         }
     }
 
-    /// Fetches a texel that will be asked for.
+    /// Fetches a texel that will be asked for; of kinds that most maps are not, none.
     #[inline(always)]
     pub(super) fn prefetch<S: Simd>(&self, s: S, index: usize) {
         match self.texels {
