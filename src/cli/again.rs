@@ -17,7 +17,7 @@ use super::stats::Counted;
 use crate::accel::auto::Reason;
 use crate::accel::{AccelKind, Assign, MailboxKind};
 use crate::image::{ExrSamples, FileKind, ImageError, Metadata, PngDepth, read_metadata};
-use crate::load::{Diagnostic, Loaded, MtlMode, Polygons};
+use crate::load::{Diagnostic, Loaded, MtlMode, Polygons, archive};
 use crate::math::DVec3;
 use crate::number::hash;
 use crate::render::Sampled;
@@ -360,7 +360,7 @@ fn repeat_from(metadata: Option<Metadata>, picture: &Path, typed: &RenderArgs) -
 /// whether it is the same.
 fn found(input: &str, picture: &Path) -> PathBuf {
     let (named, folder) = (PathBuf::from(input), picture.parent().unwrap_or(Path::new("")));
-    if input == "-" || named.exists() {
+    if input == "-" || archive::is_there(&named) {
         return named;
     }
     let beside = named.file_name().map(|name| folder.join(name));

@@ -7,6 +7,7 @@
 use super::job::{Batch, RenderJob, Shot};
 use crate::image::{Metadata, read_metadata};
 use crate::load::Loaded;
+use crate::load::archive;
 use crate::load::paths::FileRead;
 use serde_json::{Map, Value};
 use std::fs::File;
@@ -77,8 +78,9 @@ static PROGRAM: LazyLock<String> = LazyLock::new(|| {
 });
 
 fn hash_of_file(path: &Path) -> io::Result<u128> {
+    let Ok(metadata) = path.metadata() else { return archive::read(path).map(|bytes| xxh3_128(&bytes)) };
     // Opening anything but a plain file could wait for ever.
-    if !path.metadata()?.is_file() {
+    if !metadata.is_file() {
         return Err(io::ErrorKind::InvalidInput.into());
     }
     let (mut file, mut hash, mut chunk) = (File::open(path)?, Xxh3::new(), vec![0; CHUNK]);

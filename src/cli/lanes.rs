@@ -13,6 +13,7 @@ use super::outputs::Target;
 use super::progress::Progress;
 use super::render::{self, SoFar};
 use crate::image::was_written_by_meshray;
+use crate::load::archive::{self, Archive};
 use crate::load::is_called_a_model;
 use crate::render::Settings;
 use crate::threads;
@@ -98,11 +99,13 @@ impl Sizes {
     fn are_small(&mut self, batch: &Batch) -> bool {
         let mut length = |input: &PathBuf| {
             let kind = input.extension()?.to_str()?.to_ascii_lowercase();
-            // What is not there is soon said.
-            let Ok(file) = input.metadata() else { return Some(0) };
+            // Of what is unpacked it has its share; what is not there is soon said.
+            let share = |archive: Archive| archive.unpacked() / (archive.models().count() as u64).max(1);
+            let Ok(file) = input.metadata() else { return Some(archive::of_path(input).map_or(0, share)) };
             let own = file.is_file().then_some(file.len())?;
             match kind.as_str() {
                 "glb" | "ply" | "stl" => Some(own),
+                "zip" => archive::of_path(input).map(share),
                 "nff" => self.has_size.then_some(own),
                 "gltf" | "obj" => {
                     let folder = input.parent()?;

@@ -14,8 +14,8 @@ const FEATURES: [(&str, bool); 4] = [
 pub(super) static LONG: LazyLock<String> = LazyLock::new(|| {
     let features: Vec<&str> = FEATURES.into_iter().filter(|(_, there)| *there).map(|(name, _)| name).collect();
     format!(
-        "{SHORT}\ninput: glTF 2.0 (.glb, .gltf, .vrm), Wavefront OBJ + MTL, PLY, STL, NFF, meshray scenes (.toml)\n\
-         output: PNG, OpenEXR, JPEG, WebP\nfeatures: {}",
+        "{SHORT}\ninput: glTF 2.0 (.glb, .gltf, .vrm), Wavefront OBJ + MTL, PLY, STL, NFF, meshray scenes (.toml), \
+         and zip archives of these\noutput: PNG, OpenEXR, JPEG, WebP\nfeatures: {}",
         features.join(", ")
     )
 });

@@ -3,7 +3,7 @@
 use super::output_name::{collision, identity};
 use super::outputs::Target;
 use crate::image::{destination, folder_takes, was_written_by_meshray};
-use crate::load::Diagnostic;
+use crate::load::{Diagnostic, archive};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -25,7 +25,9 @@ impl Sources {
     /// These files, too.
     pub(super) fn add(&self, files: impl IntoIterator<Item: AsRef<Path>>) {
         let named = files.into_iter().filter(|file| file.as_ref() != Path::new("-"));
-        let files: Vec<PathBuf> = named.map(|file| identity(file.as_ref())).collect();
+        // Of what lies in an archive the archive is read.
+        let on_disk = |file: &Path| archive::split(file).map_or_else(|| identity(file), |(above, _)| identity(above));
+        let files: Vec<PathBuf> = named.map(|file| on_disk(file.as_ref())).collect();
         self.known().extend(files);
     }
 

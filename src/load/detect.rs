@@ -48,7 +48,7 @@ const LFS_POINTER: &str = "a Git LFS pointer, not the file itself";
 const EMPTY: &str = "empty";
 
 /// How a zip archive begins.
-const ZIP: &[u8] = b"PK\x03\x04";
+pub(super) const ZIP: &[u8; 4] = b"PK\x03\x04";
 
 /// Extensions of kinds that are zip archives of what they hold.
 const ZIPPED: [&str; 2] = ["usdz", "3mf"];
@@ -72,6 +72,11 @@ const FOREIGN_EXTENSIONS: &[(&str, &str)] = &[
     ("mtl", "a material library, not a model"),
     ("bin", "a binary buffer, not a model"),
 ];
+
+/// Whether a file that is a zip archive is a model of another kind by its name.
+pub(super) fn is_zipped_kind(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| ZIPPED.iter().any(|zipped| extension.eq_ignore_ascii_case(zipped)))
+}
 
 /// Names the kind of `source`, or says what it is instead.
 pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
@@ -211,7 +216,7 @@ mod tests {
     use super::*;
 
     fn of(name: &str, bytes: &[u8]) -> Result<Format, String> {
-        detect(&Source { path: name.into(), bytes: bytes.to_vec() }).map_err(|d| d.to_string())
+        detect(&Source::new(name.into(), bytes.to_vec())).map_err(|d| d.to_string())
     }
 
     #[test]

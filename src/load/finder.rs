@@ -198,7 +198,7 @@ mod tests {
             fs::create_dir_all(path.parent().unwrap()).unwrap();
             fs::write(path, file.as_bytes()).unwrap();
         }
-        let source = Source { path: dir.path().join("m.obj"), bytes: Vec::new() };
+        let source = Source::new(dir.path().join("m.obj"), Vec::new());
         let mut resolver = Resolver::new(&source, &LoadOptions::default());
         run(&mut Finder { resolver: &mut resolver, missed: &mut 0 })
     }

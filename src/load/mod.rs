@@ -3,6 +3,7 @@
 //! Files a user gives are not trusted: other files they name are read only below [`LoadOptions::root`], sizes are
 //! checked before memory is taken, and whatever is broken ends in a [`LoadError`] or in a warning, never in a panic.
 
+pub mod archive;
 pub(crate) mod choice;
 mod detect;
 pub mod diagnostic;
@@ -34,17 +35,21 @@ pub use diagnostic::{Diagnostic, LoadError, Warnings};
 pub use limits::Limits;
 pub use wires::WireFacts;
 
+use archive::Archive;
 use limits::{Budget, OverBudget};
 use paths::FileRead;
 
 use crate::scene::{Scene, UpAxis};
 use crate::stopwatch::{Spent, Stopwatch};
+use std::io::Seek;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// How to load.
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
-    /// Files are read only below this folder; `None`: the folder of the model.
+    /// Files are read only below this folder; `None`: the folder of the model. What a model in an archive names is read from
+    /// that archive alone.
     pub root: Option<PathBuf>,
     /// Bounds on memory and sizes.
     pub limits: Limits,
@@ -201,16 +206,24 @@ pub struct Source {
     pub path: PathBuf,
     /// Its bytes.
     pub bytes: Vec<u8>,
+    /// The archive that it lies in, if it does.
+    pub within: Option<Arc<Archive>>,
 }
 
 impl Source {
+    /// One that lies in no archive.
+    pub fn new(path: PathBuf, bytes: Vec<u8>) -> Self {
+        Self { path, bytes, within: None }
+    }
+
     /// Whether it came from standard input.
     pub fn is_stdin(&self) -> bool {
         self.path == Path::new("-")
     }
 }
 
-/// Loads a model or scene file.
+/// Loads a model or scene file, or the only model of a zip archive. One of several in an archive is named as in a folder:
+/// `ships.zip/tug/tug.gltf`.
 ///
 /// # Errors
 /// [`LoadError::Read`] when the file itself cannot be read, [`LoadError::Input`] when what it holds cannot be drawn.
@@ -228,9 +241,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
 
 /// Loads a model or scene from memory. Files it names are looked up beside `name`, which need not be there; for `-` in
 /// [`LoadOptions::root`]. A name without a folder stands for one in the current folder: where nothing is to be read but these
-/// bytes, the root is an empty folder and the name `-`.
+/// bytes, the root is an empty folder and the name `-`. A zip archive holds all files of its model, and no others are read.
 pub fn load_bytes(name: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    let mut loaded = load_source(&Source { path: name.into(), bytes }, options)?;
+    let mut loaded = load_source(&in_memory(name, bytes, &options.limits)?, options)?;
     check_wishes(&loaded, name, options)?;
     check_moment(&mut loaded, name, options)?;
     Ok(loaded)
@@ -296,7 +309,8 @@ fn load_within(source: &Source, options: &LoadOptions, budget: &mut Budget) -> R
     let too_large = |what: &str, over: OverBudget| {
         LoadError::from(Diagnostic::over_memory(&source.path, "", format!("{what} too large: {over}")))
     };
-    budget.take(source.bytes.len() as u64, 1).map_err(|over| too_large("the file is", over))?;
+    let held = source.within.as_ref().map_or(0, |archive| archive.held());
+    budget.take(held.saturating_add(source.bytes.len() as u64), 1).map_err(|over| too_large("the file is", over))?;
     let format = detect::detect(source)?;
     let mut loaded = match format {
         detect::Format::Gltf => gltf::load(source, options, budget),
@@ -317,18 +331,37 @@ fn load_within(source: &Source, options: &LoadOptions, budget: &mut Budget) -> R
     Ok(loaded)
 }
 
+/// What is in memory: a model or scene file, or an archive with a model.
+fn in_memory(name: &Path, bytes: Vec<u8>, limits: &Limits) -> Result<Source, LoadError> {
+    if !archive::is_archive(name, &bytes) {
+        return Ok(Source::new(name.into(), bytes));
+    }
+    let archive = Archive::from_bytes(name, bytes).map_err(|error| archive::unreadable(error, name))?;
+    archive::only_model(archive, limits)
+}
+
 /// Reads the model file itself, which may lie anywhere.
 fn read_source(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
-    let what = || Box::new(Diagnostic::new("file-unreadable", path, "", "cannot be read"));
-    let fault = |source| LoadError::Read { what: what(), source };
-    let too_large = |bytes: u64| {
-        let text = format!("{bytes} bytes where {} are allowed", limits.file);
-        LoadError::from(Diagnostic::new("file-too-large", path, "", text).remedy(limits.remedy_for_file()))
+    let fault = |error| archive::unreadable(error, path);
+    let too_large = |bytes| LoadError::from(too_large(path, bytes, limits));
+    let mut file = match std::fs::File::open(path) {
+        Ok(file) => file,
+        Err(error) => {
+            let (archive, name) = archive::in_archive(path).map_err(fault)?.ok_or_else(|| fault(error))?;
+            return archive::named_model(archive, &name, limits);
+        }
     };
-    let file = std::fs::File::open(path).map_err(fault)?;
     let meta = file.metadata().map_err(fault)?;
     if meta.is_dir() {
         return Err(Diagnostic::new("file-not-plain", path, "", "is a folder").remedy("name a file in it").into());
+    }
+    // What is no plain file, such as a pipe, is read but once; an archive may be larger than one.
+    if meta.is_file() {
+        if archive::begins_as_archive(path, &mut file).map_err(fault)? {
+            let archive = Archive::of_file(path, file).map_err(fault)?;
+            return archive::only_model(archive, limits);
+        }
+        file.rewind().map_err(fault)?;
     }
     if meta.len() > limits.file {
         return Err(too_large(meta.len()));
@@ -337,5 +370,11 @@ fn read_source(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
     if bytes.len() as u64 > limits.file {
         return Err(too_large(bytes.len() as u64));
     }
-    Ok(Source { path: path.into(), bytes })
+    in_memory(path, bytes, limits)
+}
+
+/// What is told of a model file that is larger than is allowed.
+fn too_large(path: &Path, bytes: u64, limits: &Limits) -> Diagnostic {
+    let text = format!("{bytes} bytes where {} are allowed", limits.file);
+    Diagnostic::new("file-too-large", path, "", text).remedy(limits.remedy_for_file())
 }

@@ -251,7 +251,7 @@ mod tests {
     fn file(picture: &DynamicImage, format: ImageFormat) -> Source {
         let mut out = Cursor::new(Vec::new());
         picture.write_to(&mut out, format).unwrap();
-        Source { path: "sky.exr".into(), bytes: out.into_inner() }
+        Source::new("sky.exr".into(), out.into_inner())
     }
 
     fn bright(width: u32, height: u32) -> DynamicImage {
@@ -264,7 +264,7 @@ mod tests {
         let Source { bytes, .. } = file(&bright(4, 2), ImageFormat::Hdr);
         let texels = |head: &str| {
             let bytes = [head.as_bytes(), &bytes["#?RADIANCE\n".len()..]].concat();
-            let source = Source { path: "sky.hdr".into(), bytes };
+            let source = Source::new("sky.hdr".into(), bytes);
             decode(&source, &Limits::default()).map(|loaded| loaded.panorama.texels.to_vec())
         };
         let plain = texels("#?RADIANCE\n").unwrap();
@@ -316,7 +316,7 @@ mod tests {
             Some(::exr::meta::attribute::Chromaticities { red, green, blue, white: Vec2(0.3127, 0.329) });
         let mut out = Cursor::new(Vec::new());
         Image::from_layers(attributes, layers).write().non_parallel().to_buffered(&mut out).unwrap();
-        Source { path: "sky.exr".into(), bytes: out.into_inner() }
+        Source::new("sky.exr".into(), out.into_inner())
     }
 
     #[test]
@@ -377,7 +377,7 @@ mod tests {
         encoder.set_exif_metadata(exif).unwrap();
         let rows = [[250u8; 16 * 8 * 3], [5; 16 * 8 * 3]].concat();
         encoder.write_image(&rows, 16, 16, ::image::ExtendedColorType::Rgb8).unwrap();
-        let loaded = decode(&Source { path: "sky.jpg".into(), bytes }, &Limits::default()).unwrap();
+        let loaded = decode(&Source::new("sky.jpg".into(), bytes), &Limits::default()).unwrap();
         let texels = &loaded.panorama.texels;
         assert!(texels[0][0] < 0.1 && texels[255][0] > 0.9, "{:?} {:?}", texels[0], texels[255]);
     }
@@ -407,7 +407,7 @@ mod tests {
     fn what_is_no_picture_damaged_or_too_large_is_refused_in_one_line() {
         let whole = file(&bright(64, 32), ImageFormat::OpenExr);
         let refused = |bytes: &[u8], limits: &Limits| {
-            let source = Source { path: "sky.exr".into(), bytes: bytes.to_vec() };
+            let source = Source::new("sky.exr".into(), bytes.to_vec());
             let text = decode(&source, limits).unwrap_err().to_string();
             assert!(text.starts_with("sky.exr: ") && !text.trim_end().contains('\n'), "{text}");
         };
@@ -444,7 +444,7 @@ mod tests {
                     bytes[at] = random.bits().to_le_bytes()[0];
                 }
                 let limits = Limits { memory: 1 << 24, ..Limits::default() };
-                if let Err(error) = decode(&Source { path: "sky".into(), bytes }, &limits) {
+                if let Err(error) = decode(&Source::new("sky".into(), bytes), &limits) {
                     let LoadError::Input(faults) = error else { panic!("{error} is told as a fault of reading") };
                     assert!(["env-unusable", OVER_MEMORY].contains(&faults[0].code), "{}", faults[0]);
                 }

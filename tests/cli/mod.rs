@@ -2,6 +2,7 @@
 
 mod again;
 mod animation;
+mod archives;
 mod backdrop;
 mod bench;
 mod collections;

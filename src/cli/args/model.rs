@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// One model and how to load it.
 #[derive(Debug, Clone, Args)]
 pub(in crate::cli) struct ModelArgs {
-    /// A model or scene file; `-` reads standard input
+    /// A model or scene file, or a zip archive with a model; `-` reads standard input
     #[arg(value_name = "FILE")]
     pub input: PathBuf,
     /// How.
@@ -51,7 +51,7 @@ pub(in crate::cli) struct LoadArgs {
     /// Understand MTL files as exporters mean them, or to the letter
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub mtl: MtlArg,
-    /// Read other files only below this folder [default: the model's folder]
+    /// Read other files only below this folder [default: the model's folder; of an archive the archive, always]
     #[arg(long, value_name = "DIR", help_heading = "Loading", hide_short_help = true)]
     pub root: Option<PathBuf>,
     /// Refuse inputs that take more memory than this to load, such as 2G or 500M; what is built of them comes on top

@@ -17,7 +17,11 @@ use std::path::PathBuf;
 /// What `meshray render` was given.
 #[derive(Debug, Clone, Args)]
 pub(in crate::cli) struct RenderArgs {
-    /// Models (.glb, .gltf, .vrm, .obj, .ply, .stl, .nff), folders of them, or scene files (.toml); `-` reads standard input
+    /// Models (.glb, .gltf, .vrm, .obj, .ply, .stl, .nff), folders and .zip archives of them, or scene files (.toml); `-` reads
+    /// standard input
+    ///
+    /// An archive is not unpacked. Its only model is drawn under the name of the archive; one with several models is a folder
+    /// of them, and one of these is named as in a folder: ships.zip/tug/tug.gltf.
     #[arg(value_name = "INPUT", required_unless_present = "again")]
     pub inputs: Vec<PathBuf>,
     /// The folders among them.

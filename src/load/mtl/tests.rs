@@ -20,7 +20,7 @@ fn load(obj: &str, mtl: &str, pictures: &[(&str, [u8; 4])], mode: MtlMode) -> Lo
     for (name, texel) in pictures {
         png(&dir.path().join(name), *texel);
     }
-    let source = Source { path: dir.path().join("m.obj"), bytes: obj.as_bytes().to_vec() };
+    let source = Source::new(dir.path().join("m.obj"), obj.as_bytes().to_vec());
     load_source(&source, &LoadOptions { mtl: mode, ..LoadOptions::default() }).unwrap()
 }
 
@@ -232,7 +232,7 @@ fn pictures_that_are_made_take_from_the_memory_that_may_be_taken() {
     ::image::GrayImage::new(3000, 1).save(dir.path().join("row.png")).unwrap();
     ::image::GrayImage::new(1, 3000).save(dir.path().join("column.png")).unwrap();
     fs::write(dir.path().join("m.mtl"), "newmtl a\nKd 1 1 1\nmap_Pr row.png\nmap_Pm column.png\n").unwrap();
-    let source = Source { path: dir.path().join("m.obj"), bytes: OBJ.as_bytes().to_vec() };
+    let source = Source::new(dir.path().join("m.obj"), OBJ.as_bytes().to_vec());
     let mut options = LoadOptions::default();
     options.limits.memory = 10_000_000;
     let loaded = load_source(&source, &options).unwrap();
@@ -287,7 +287,7 @@ fn a_picture_of_many_names_is_read_and_charged_once() {
     fs::write(dir.path().join("a.png"), bytes).unwrap();
     let uses: String = (0..60).map(|i| format!("usemtl m{i}\nf 1/1 2/2 3/3\n")).collect();
     let obj = format!("{}{uses}", OBJ.replace("usemtl a\nf 1/1 2/2 3/3\n", ""));
-    let source = Source { path: dir.path().join("m.obj"), bytes: obj.into() };
+    let source = Source::new(dir.path().join("m.obj"), obj.into());
     let mut options = LoadOptions::default();
     options.limits.memory = 1_800_000;
     let loaded = load_source(&source, &options).unwrap();

@@ -2,7 +2,7 @@ use super::*;
 use crate::load::Polygons;
 
 fn load_with(text: &str, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    let source = Source { path: "a.nff".into(), bytes: text.into() };
+    let source = Source::new("a.nff".into(), text.into());
     load(&source, options, &mut Budget::new(&options.limits))
 }
 

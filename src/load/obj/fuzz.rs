@@ -38,7 +38,7 @@ fn mesh() -> impl Strategy<Value = String> {
 fn check(text: &str) {
     for polygons in [Polygons::Cut, Polygons::Whole] {
         let options = LoadOptions { polygons, ..LoadOptions::default() };
-        let source = Source { path: "fuzz.obj".into(), bytes: text.as_bytes().to_vec() };
+        let source = Source::new("fuzz.obj".into(), text.as_bytes().to_vec());
         if let Ok(loaded) = load_source(&source, &options) {
             assert_sound(&loaded);
         }
@@ -54,13 +54,13 @@ proptest! {
     #[test]
     fn any_mesh_ends_in_a_sound_scene(text in mesh()) {
         check(&text);
-        let source = Source { path: "fuzz.obj".into(), bytes: text.into_bytes() };
+        let source = Source::new("fuzz.obj".into(), text.into_bytes());
         prop_assert!(load_source(&source, &LoadOptions::default()).is_ok());
     }
 
     #[test]
     fn any_bytes_end_in_a_sound_scene_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-        let source = Source { path: "fuzz.obj".into(), bytes };
+        let source = Source::new("fuzz.obj".into(), bytes);
         if let Ok(loaded) = load_source(&source, &LoadOptions::default()) {
             assert_sound(&loaded);
         }

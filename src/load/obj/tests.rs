@@ -16,7 +16,7 @@ fn of(text: &str) -> Loaded {
 }
 
 fn with(bytes: &[u8], options: &LoadOptions) -> Loaded {
-    let source = Source { path: "m.obj".into(), bytes: bytes.to_vec() };
+    let source = Source::new("m.obj".into(), bytes.to_vec());
     load(&source, options, &mut Budget::new(&options.limits)).unwrap()
 }
 
@@ -304,7 +304,7 @@ fn a_coordinate_that_cannot_be_there_costs_no_corner_where_the_file_has_none_at_
     let face = "f 1/4294967295 2/2000000000 3/7 4";
     let loaded = of(&format!("{SQUARE}{face}"));
     assert_eq!((triangles(&loaded), codes(&loaded)), (2, vec![("obj-absent-attribute", 3)]));
-    let source = Source { path: "m.obj".into(), bytes: format!("{SQUARE}vt 0 0\n{face}").into_bytes() };
+    let source = Source::new("m.obj".into(), format!("{SQUARE}vt 0 0\n{face}").into_bytes());
     let options = LoadOptions::default();
     let Err(LoadError::Input(faults)) = load(&source, &options, &mut Budget::new(&options.limits)) else { panic!() };
     assert!(faults[0].to_string().contains("texture coordinate 4294967295, but there are 1"), "{}", faults[0]);
@@ -319,7 +319,7 @@ fn tangents_for_a_normal_map_are_charged_before_they_are_made() {
     let faces = "f 1/1 2/1 3/1\n".repeat(2000);
     let read = |material: &str| {
         let text = format!("mtllib m.mtl\n{TRIANGLE}vt 0 0\nusemtl {material}\n{faces}");
-        let source = Source { path: path("m.obj"), bytes: text.into_bytes() };
+        let source = Source::new(path("m.obj"), text.into_bytes());
         let options = LoadOptions::default();
         load(&source, &options, &mut Budget::new(&Limits { memory: 1_500_000, ..Limits::default() }))
     };
@@ -330,7 +330,7 @@ fn tangents_for_a_normal_map_are_charged_before_they_are_made() {
 
 #[test]
 fn of_several_faults_the_first_is_told_with_the_number_of_its_kind() {
-    let source = Source { path: "m.obj".into(), bytes: format!("{TRIANGLE}f 1 2 9\nf 0 1 2\nf 1 2 8\n").into_bytes() };
+    let source = Source::new("m.obj".into(), format!("{TRIANGLE}f 1 2 9\nf 0 1 2\nf 1 2 8\n").into_bytes());
     let options = LoadOptions::default();
     let Err(LoadError::Input(faults)) = load(&source, &options, &mut Budget::new(&options.limits)) else { panic!() };
     let told = faults[0].to_string();

@@ -6,16 +6,18 @@
 
 #[cfg(test)]
 mod tests;
+mod volume;
 
+use super::archive::{self, ArchiveFault};
 use super::limits::{Budget, OverBudget};
-use super::{Diagnostic, Limits, LoadOptions, Source, whole};
+use super::{Diagnostic, Limits, LoadError, LoadOptions, Source};
 use crate::stopwatch::{Spent, Stopwatch};
 use percent_encoding::percent_decode_str;
 use std::cell::Cell;
 use std::collections::HashMap;
-use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
+use volume::{Unread, Volume};
 use xxhash_rust::xxh3::xxh3_128;
 
 /// A file that was read.
@@ -36,6 +38,8 @@ impl AsRef<Path> for FileRead {
 /// Reads the files that a model names.
 #[derive(Clone, Debug)]
 pub struct Resolver {
+    /// Where all that is named lies.
+    volume: Volume,
     /// Whether the model is standard input, which lies nowhere.
     from_stdin: bool,
     /// Folder that relative names start from; canonical.
@@ -88,6 +92,9 @@ pub enum FileFault {
         /// The `--root` that would allow it; `None` where names start from the root.
         root: Option<PathBuf>,
     },
+    /// It lies outside the archive of the model.
+    #[error("'{0}' lies outside the archive, and nothing else is read")]
+    OutsideArchive(String),
     /// There is no such file.
     #[error("'{0}' is not there")]
     Missing(String),
@@ -120,6 +127,16 @@ pub enum FileFault {
         /// What the system said.
         source: io::Error,
     },
+    /// The archive that it lies in does not give it.
+    #[error("'{name}' cannot be unpacked: {fault}")]
+    Packed {
+        /// As written in the model.
+        name: String,
+        /// Why.
+        fault: String,
+        /// What helps.
+        remedy: &'static str,
+    },
 }
 
 impl FileFault {
@@ -136,6 +153,7 @@ impl FileFault {
                 "file-outside-root",
                 "name the model's file instead of standard input, and its root with --root".into(),
             ),
+            Self::OutsideArchive(_) => ("file-outside-root", "unpack it, with what is missing in its place".into()),
             Self::Missing(name) if name.contains(['/', '\\']) => {
                 (Self::MISSING, "put it there, as seen from the model's folder".into())
             }
@@ -146,6 +164,7 @@ impl FileFault {
             Self::Scheme(_) => ("uri-scheme", "download it and name it by a relative path".into()),
             Self::BadUri(_) => ("uri-invalid", "name the file by a relative path".into()),
             Self::Io { .. } => ("file-unreadable", "see that it may be read".into()),
+            Self::Packed { remedy, .. } => (ArchiveFault::CODE, (*remedy).into()),
         };
         Diagnostic::new(code, file, place, self.to_string()).remedy(remedy)
     }
@@ -155,7 +174,7 @@ impl Resolver {
     /// A resolver for what `source` names; `source` itself is the first file read.
     ///
     /// Relative names start from the folder of `source`; where `source` has none (standard input), from the root, or
-    /// else from the current folder.
+    /// else from the current folder. Of an archive the archive is the root.
     pub fn new(source: &Source, options: &LoadOptions) -> Self {
         let current = || PathBuf::from(".");
         let folder = source.path.parent().filter(|p| !p.as_os_str().is_empty());
@@ -165,10 +184,17 @@ impl Resolver {
             None => current(),
         };
         let named = if folder.is_none() && base == current() { PathBuf::new() } else { base.clone() };
-        let base = base.canonicalize().unwrap_or(base);
-        let whole = |root: &PathBuf| root.canonicalize().unwrap_or_else(|_| root.clone());
-        let root = options.root.as_ref().map_or_else(|| base.clone(), whole);
+        let volume = source.within.clone().map_or(Volume::Disk, Volume::Archive);
+        let whole = |path: &PathBuf| volume.canonical(path).unwrap_or_else(|_| path.clone());
+        let base = whole(&base);
+        let root = match (&source.within, &options.root) {
+            (Some(archive), _) => archive.path().to_path_buf(),
+            (None, Some(root)) => whole(root),
+            (None, None) => base.clone(),
+        };
+        let canonical = whole(&source.path);
         let mut resolver = Self {
+            volume,
             from_stdin: source.is_stdin(),
             base,
             named,
@@ -180,7 +206,6 @@ impl Resolver {
             reading: Spent::default(),
             gaps: Cell::new(false),
         };
-        let canonical = source.path.canonicalize().unwrap_or_else(|_| source.path.clone());
         resolver.note(canonical, source.path.clone(), &source.bytes);
         resolver
     }
@@ -223,7 +248,7 @@ impl Resolver {
         for part in name.components() {
             match part {
                 Component::CurDir => {}
-                Component::Normal(part) if !self.base.join(&path).join(part).exists() => {
+                Component::Normal(part) if self.volume.canonical(&self.base.join(&path).join(part)).is_err() => {
                     let part = part.to_str()?.to_ascii_lowercase();
                     let listed = self.listed(&path)?.get(&part)?;
                     path.push(listed);
@@ -236,12 +261,10 @@ impl Resolver {
 
     /// What lies in a folder below the root: names by their small letters.
     fn listed(&mut self, folder: &Path) -> Option<&HashMap<String, String>> {
-        /// Files of one folder that are looked at; bounds the time.
-        const LISTED: usize = 10_000;
-        let folder = self.base.join(folder).canonicalize().ok().filter(|folder| folder.starts_with(&self.root))?;
+        let folder = self.volume.canonical(&self.base.join(folder)).ok()?;
+        let folder = folder.starts_with(&self.root).then_some(folder)?;
         let list = |folder: &PathBuf| {
-            let entries = fs::read_dir(folder).into_iter().flatten().take(LISTED).flatten();
-            let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+            let mut names = self.volume.names_in(folder);
             // Of names that are the same in small letters, the first is the last to be put in.
             names.sort_unstable_by(|a, b| b.cmp(a));
             names.into_iter().map(|name| (name.to_ascii_lowercase(), name)).collect()
@@ -251,25 +274,20 @@ impl Resolver {
 
     /// Reads a file named by a path, relative to the model or absolute.
     pub fn read_file(&mut self, name: &Path) -> Result<Vec<u8>, FileFault> {
-        let shown = || shown(name);
-        let io = |source| FileFault::Io { name: shown(), source };
         let path = self.locate(name)?;
         let watch = Stopwatch::of_this_thread();
-        let file = fs::File::open(&path).map_err(io)?;
-        let meta = file.metadata().map_err(io)?;
-        if !meta.is_file() {
-            return Err(FileFault::NotAFile(shown()));
-        }
         let (limit, remedy) = (self.limits.file, self.limits.remedy_for_file());
-        let too_large = |bytes| FileFault::TooLarge { name: shown(), bytes, limit, remedy };
-        if meta.len() > limit {
-            return Err(too_large(meta.len()));
-        }
-        // What other threads would do meanwhile is not in this one's time.
-        let bytes = whole::read_in_turn(file, meta.len(), limit).map_err(io)?;
-        if bytes.len() as u64 > limit {
-            return Err(too_large(bytes.len() as u64));
-        }
+        let bytes = self.volume.read(&path, limit).map_err(|why| {
+            let name = shown(name);
+            match why {
+                Unread::NotAFile => FileFault::NotAFile(name),
+                Unread::TooLarge(bytes) => FileFault::TooLarge { name, bytes, limit, remedy },
+                Unread::Io(source) => match archive::of_archive(&source) {
+                    Some(why) => FileFault::Packed { name, fault: why.to_string(), remedy: why.remedy() },
+                    None => FileFault::Io { name, source },
+                },
+            }
+        })?;
         self.reading += watch.read();
         self.note(path, self.as_named(name), &bytes);
         Ok(bytes)
@@ -290,6 +308,29 @@ impl Resolver {
         let bytes = self.read_file(name)?;
         // It may have grown meanwhile, or the system does not say how long it is.
         Ok(budget.take((bytes.len() as u64).saturating_sub(said), 1).map(|()| bytes))
+    }
+
+    /// Reads a model that [`Self::locate_model`] has found.
+    pub(super) fn read_model(&self, canonical: &Path) -> Result<Source, LoadError> {
+        match &self.volume {
+            Volume::Disk => super::read_source(canonical, &self.limits),
+            Volume::Archive(archive) => {
+                let name = canonical.strip_prefix(archive.path()).unwrap_or(canonical);
+                archive::source(archive.clone(), name, &self.limits)
+            }
+        }
+    }
+
+    /// The same as [`Self::locate`] of a model that a scene file names, which may lie in an archive below the root.
+    pub(super) fn locate_model(&self, name: &Path) -> Result<PathBuf, FileFault> {
+        let located = self.locate(name);
+        let Err(FileFault::Io { .. } | FileFault::Missing(_)) = located else { return located };
+        let wanted = self.base.join(name);
+        match archive::split(&wanted) {
+            // Whether the archive has it is told when it is read.
+            Some((above, rest)) => self.locate(above).map(|above| above.join(rest)),
+            None => located,
+        }
     }
 
     /// A file as it is named, from the folder of the model as that was.
@@ -314,19 +355,15 @@ impl Resolver {
         if name.as_os_str().is_empty() || name.as_os_str().as_encoded_bytes().contains(&0) {
             return Err(FileFault::BadUri(shown));
         }
-        let outside = |path: &Path| FileFault::Outside {
-            name: shown.clone(),
-            within: match self.root == self.base {
-                true => "the model's folder".into(),
-                false => format!("'{}'", self.root.display()),
-            },
-            root: (!self.from_stdin).then(|| common_folder(&self.root, path)),
+        let outside = |path: &Path| match self.volume {
+            Volume::Archive(_) => FileFault::OutsideArchive(shown.clone()),
+            Volume::Disk => self.outside(shown.clone(), path),
         };
         let wanted = self.base.join(name);
-        match wanted.canonicalize() {
-            Ok(path) if path.starts_with(&self.root) => match fs::metadata(&path) {
-                Ok(meta) if meta.is_file() => Ok(path),
-                Ok(_) => Err(FileFault::NotAFile(shown)),
+        match self.volume.canonical(&wanted) {
+            Ok(path) if path.starts_with(&self.root) => match self.volume.is_file(&path) {
+                Ok(true) => Ok(path),
+                Ok(false) => Err(FileFault::NotAFile(shown)),
                 Err(source) => Err(FileFault::Io { name: shown, source }),
             },
             Ok(path) => Err(outside(&path)),
@@ -340,9 +377,21 @@ impl Resolver {
         }
     }
 
+    /// What is told of a file outside the root.
+    fn outside(&self, name: String, path: &Path) -> FileFault {
+        FileFault::Outside {
+            name,
+            within: match self.root == self.base {
+                true => "the model's folder".into(),
+                false => format!("'{}'", self.root.display()),
+            },
+            root: (!self.from_stdin).then(|| common_folder(&self.root, path)),
+        }
+    }
+
     /// Bytes of a file that [`Self::locate`] has found; 0 where the system does not say.
     pub fn length(&self, canonical: &Path) -> u64 {
-        fs::metadata(canonical).map_or(0, |meta| meta.len())
+        self.volume.length(canonical)
     }
 
     fn note(&mut self, canonical: PathBuf, shown: PathBuf, bytes: &[u8]) {

@@ -1,6 +1,7 @@
 //! Which files are found, and which are not.
 
 use super::*;
+use std::fs;
 
 /// A folder `model/` with a file, and a secret beside it.
 fn folder() -> tempfile::TempDir {
@@ -14,7 +15,7 @@ fn folder() -> tempfile::TempDir {
 }
 
 fn resolver(dir: &Path, options: &LoadOptions) -> Resolver {
-    Resolver::new(&Source { path: dir.join("model/m.gltf"), bytes: b"m".to_vec() }, options)
+    Resolver::new(&Source::new(dir.join("model/m.gltf"), b"m".to_vec()), options)
 }
 
 #[test]
@@ -64,7 +65,7 @@ fn files_outside_the_root_are_refused_with_the_root_that_would_work() {
 fn of_standard_input_no_root_lets_names_out_and_none_is_advised() {
     let dir = folder();
     let options = LoadOptions { root: Some(dir.path().join("model")), ..LoadOptions::default() };
-    let mut resolver = Resolver::new(&Source { path: "-".into(), bytes: b"m".to_vec() }, &options);
+    let mut resolver = Resolver::new(&Source::new("-".into(), b"m".to_vec()), &options);
     let fault = resolver.read_uri("../secret.bin").unwrap_err();
     assert!(matches!(fault, FileFault::Outside { root: None, .. }), "{fault}");
     assert!(fault.diagnose(Path::new("-"), "").remedy.contains("instead of standard input"));

@@ -8,7 +8,7 @@ use crate::scene::AlphaMode;
 pub(super) mod painted;
 
 pub(super) fn of(bytes: &[u8], options: &LoadOptions) -> Result<Loaded, String> {
-    let source = Source { path: "a.ply".into(), bytes: bytes.to_vec() };
+    let source = Source::new("a.ply".into(), bytes.to_vec());
     load(&source, options, &mut Budget::new(&options.limits)).map_err(|e| e.to_string())
 }
 

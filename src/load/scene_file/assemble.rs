@@ -50,12 +50,15 @@ fn check_files(
     resolver: &Resolver,
 ) -> Result<(), LoadError> {
     let of_models = models.iter().map(|model| (&model.file, model.at));
-    for (file, at) in of_models.chain(panorama.map(|picture| (&picture.file, picture.at))) {
+    let of_panorama = panorama.map(|picture| (&picture.file, picture.at));
+    let look_for = |file: &str, at, found: Result<_, FileFault>| {
         let elsewhere = file.contains("://").then(|| FileFault::Scheme(shorten(file)));
-        if let Some(fault) = elsewhere.or_else(|| resolver.locate(Path::new(file)).err()) {
+        if let Some(fault) = elsewhere.or_else(|| found.err()) {
             faults.note_file(at, &fault);
         }
-    }
+    };
+    of_models.for_each(|(file, at)| look_for(file, at, resolver.locate_model(Path::new(file))));
+    of_panorama.into_iter().for_each(|(file, at)| look_for(file, at, resolver.locate(Path::new(file))));
     faults.check()
 }
 
@@ -91,7 +94,7 @@ impl Assembly<'_> {
             .read_file_within(Path::new(&file), &mut self.budget.clone())
             .map_err(|fault| LoadError::from(fault.diagnose(path, &self.faults.place(at))))?
             .map_err(over)?;
-        let picture = Source { path: path.with_file_name(&file), bytes };
+        let picture = Source::new(path.with_file_name(&file), bytes);
         let left = Limits { memory: self.budget.left(), ..self.options.limits };
         let LoadedPanorama { panorama, warnings, .. } = panorama::decode(&picture, &left)?;
         self.budget.take(panorama.texels.len() as u64, panorama::PER_PIXEL).map_err(over)?;
@@ -158,7 +161,7 @@ impl Assembly<'_> {
         let Self { faults, source, options, resolver, .. } = self;
         let place = || faults.place(model.at);
         let path = resolver
-            .locate(Path::new(&model.file))
+            .locate_model(Path::new(&model.file))
             .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &place())))?;
         let before = options.animations_before.unwrap_or(0) + self.facts.animations.len();
         let options = LoadOptions {
@@ -168,7 +171,7 @@ impl Assembly<'_> {
             ..options.clone()
         };
         let watch = Stopwatch::of_this_thread();
-        let model_source = crate::load::read_source(&path, &options.limits)?;
+        let model_source = resolver.read_model(&path)?;
         let reading = watch.read();
         // Asked before it is read, or a file that names itself would never end.
         if matches!(detect::detect(&model_source)?, detect::Format::SceneFile) {

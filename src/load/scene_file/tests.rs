@@ -11,7 +11,7 @@ fn load_with(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError
 }
 
 fn load_text(text: &str) -> Result<Loaded, LoadError> {
-    load_source(&Source { path: "dir/test.toml".into(), bytes: text.into() })
+    load_source(&Source::new("dir/test.toml".into(), text.into()))
 }
 
 fn faults(text: &str) -> Vec<String> {
@@ -46,7 +46,7 @@ fn a_picture_may_surround_the_scene() {
     let dir = tempfile::tempdir().unwrap();
     ::image::Rgb32FImage::from_pixel(4, 2, ::image::Rgb([2.0, 1.0, 0.5])).save(dir.path().join("sky.exr")).unwrap();
     let text = "environment = 'sky.exr'\nenvironment_rotation = 90\n[[spheres]]\ncenter = [0, 0, 0]\nradius = 1\n";
-    let source = Source { path: dir.path().join("a.toml"), bytes: text.into() };
+    let source = Source::new(dir.path().join("a.toml"), text.into());
     let loaded = load_source(&source).unwrap();
     assert_eq!(loaded.scene.environment, Environment::Panorama);
     let panorama = loaded.scene.panorama.unwrap();
@@ -75,7 +75,7 @@ fn broken_syntax_says_where() {
     let errors = faults("up = \"y\"\n[[spheres]\n");
     assert!(errors[0].starts_with("dir/test.toml:2:"), "{errors:?}");
     assert!(load_text("\u{feff}up = 'y'").is_ok());
-    assert!(load_source(&Source { path: "x.toml".into(), bytes: vec![0xff] }).is_err());
+    assert!(load_source(&Source::new("x.toml".into(), vec![0xff])).is_err());
 }
 
 #[test]
@@ -279,7 +279,7 @@ fn the_material_of_a_model_replaces_those_of_all_its_shapes() {
     .unwrap();
     let text = "[materials.green]\n[materials.red]\n[[spheres]]\ncenter=[9,9,9]\nradius=1\nmaterial='green'\n\
                 [[models]]\nfile='m.nff'\nmaterial='red'\n[[models]]\nfile='m.nff'\n";
-    let source = Source { path: dir.path().join("a.toml"), bytes: text.into() };
+    let source = Source::new(dir.path().join("a.toml"), text.into());
     let scene = load_source(&source).unwrap().scene;
     let named = |material: u32| scene.materials[material as usize].name.as_str();
     assert_eq!(
@@ -300,7 +300,7 @@ fn what_several_models_show_is_read_once_and_stands_as_if_it_were_read_for_each(
             "[[models]]\nfile='m.nff'\ntranslate=[1,2,3]\n[[models]]\nfile='{second}'\nrotate=[10,20,30]\nscale=2\n\
              [[models]]\nfile='m.nff'\nup='z'\n"
         );
-        load_source(&Source { path: dir.path().join("a.toml"), bytes: text.into() }).unwrap()
+        load_source(&Source::new(dir.path().join("a.toml"), text.into())).unwrap()
     };
     let (once, each) = (load("m.nff"), load("copy.nff"));
     let stored = |loaded: &Loaded| (loaded.scene.meshes.len(), loaded.scene.materials.len());
@@ -329,7 +329,7 @@ fn the_text_and_all_models_share_one_budget() {
     let fault = |text: String, memory: u64| {
         let mut options = LoadOptions::default();
         options.limits.memory = memory;
-        let source = Source { path: dir.path().join("a.toml"), bytes: text.into() };
+        let source = Source::new(dir.path().join("a.toml"), text.into());
         load_with(&source, &options).map(|loaded| loaded.scene.meshes.len()).map_err(|e| e.to_string())
     };
     // Each with a material of its own, or they would be read and stored once.

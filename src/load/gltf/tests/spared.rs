@@ -244,7 +244,7 @@ fn pictures_are_looked_for_beside_the_model_whatever_machine_they_were_on() {
         file.primitive(json!({"attributes": {"POSITION": positions, "TEXCOORD_0": uvs}, "material": 0}));
         file.set("images", json!([{"uri": uri}])).set("textures", json!([{"source": 0}]));
         file.set("materials", json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]));
-        let source = crate::load::Source { path: dir.path().join("m.gltf"), bytes: file.gltf() };
+        let source = crate::load::Source::new(dir.path().join("m.gltf"), file.gltf());
         let loaded = crate::load::load_source(&source, &LoadOptions::default()).unwrap();
         assert_eq!(loaded.scene.materials[0].base_color_map.is_some(), found, "{uri}: {:?}", loaded.warnings);
         let is_told = loaded.warnings.iter().any(|w| w.code == "file-elsewhere");
@@ -264,7 +264,7 @@ fn buffers_are_looked_for_beside_the_model_too() {
     let mut root: Value = serde_json::from_slice(&file.gltf()).unwrap();
     let mut load = |uri: &str| {
         root["buffers"][0]["uri"] = json!(uri);
-        let source = crate::load::Source { path: dir.path().join("m.gltf"), bytes: root.to_string().into_bytes() };
+        let source = crate::load::Source::new(dir.path().join("m.gltf"), root.to_string().into_bytes());
         crate::load::load_source(&source, &LoadOptions::default())
     };
     for uri in ["C:\\Users\\me\\mesh.bin", "/home/me/mesh.bin", "data/mesh.bin"] {

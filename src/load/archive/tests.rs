@@ -1,0 +1,228 @@
+//! Models in archives, whole and damaged.
+
+#![cfg(test)]
+
+use super::*;
+use crate::load::{LoadOptions, Loaded, load, load_bytes};
+use flate2::Compression;
+use flate2::write::DeflateEncoder;
+use rawzip::ZipArchiveWriter;
+use std::fs;
+use std::io::Write;
+
+/// A zip archive of files by name; those whose names end in `.bin` are stored as they are.
+fn zip(files: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut archive = ZipArchiveWriter::new(&mut bytes);
+    for (name, content) in files {
+        let is_stored = name.ends_with(".bin");
+        let method = if is_stored { CompressionMethod::STORE } else { CompressionMethod::DEFLATE };
+        let (mut entry, config) = archive.new_file(name).compression_method(method).start().unwrap();
+        let descriptor = if is_stored {
+            let mut writer = config.wrap(&mut entry);
+            writer.write_all(content).unwrap();
+            writer.finish().unwrap().1
+        } else {
+            let mut writer = config.wrap(DeflateEncoder::new(&mut entry, Compression::default()));
+            writer.write_all(content).unwrap();
+            let (encoder, descriptor) = writer.finish().unwrap();
+            encoder.finish().unwrap();
+            descriptor
+        };
+        entry.finish(descriptor).unwrap();
+    }
+    archive.finish().unwrap();
+    bytes
+}
+
+const OBJ: &str = "mtllib paint.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+const MTL: &[u8] = b"newmtl red\nKd 0.8 0.1 0.1\n";
+
+fn of_bytes(files: &[(&str, &[u8])]) -> Result<Loaded, LoadError> {
+    load_bytes(Path::new("a.zip"), zip(files), &LoadOptions::default())
+}
+
+/// The code and the remedy of what is wrong.
+fn fault(loaded: Result<Loaded, LoadError>) -> (&'static str, String) {
+    match loaded {
+        Err(LoadError::Input(faults)) => (faults[0].code, faults[0].to_string()),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn names(loaded: &Loaded) -> Vec<&str> {
+    loaded.facts.files.iter().map(|file| file.path.to_str().unwrap()).collect()
+}
+
+#[test]
+fn the_only_model_of_an_archive_is_loaded_with_what_it_names() {
+    let files = [
+        ("readme.txt", &b"by me"[..]),
+        ("__MACOSX/house/._house.obj", b"no model"),
+        ("house/.hidden.obj", b"no model"),
+        ("house/house.obj", OBJ.as_bytes()),
+        ("house/paint.mtl", MTL),
+    ];
+    let loaded = of_bytes(&files).unwrap();
+    assert_eq!((loaded.scene.prims(), loaded.warnings.len()), (1, 0), "{:?}", loaded.warnings);
+    assert_eq!(names(&loaded), ["a.zip/house/house.obj", "a.zip/house/paint.mtl"]);
+    // The same as unpacked.
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("house.obj"), OBJ).unwrap();
+    fs::write(dir.path().join("paint.mtl"), MTL).unwrap();
+    let unpacked = load(&dir.path().join("house.obj"), &LoadOptions::default()).unwrap();
+    assert_eq!(loaded.facts.hash, unpacked.facts.hash);
+}
+
+#[test]
+fn of_several_models_one_has_to_be_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("pack.ZIP");
+    let many = ["a/one.obj", "a/two.obj", "b/one.stl", "c.ply", "d.glb"];
+    let files = many.map(|name| (name, OBJ.as_bytes()));
+    fs::write(&path, zip(&files)).unwrap();
+    let read = |name: &str| load(&path.join(name), &LoadOptions::default());
+    let (code, text) = fault(load(&path, &LoadOptions::default()));
+    assert_eq!(code, "archive-several");
+    assert!(text.contains("5 models are in this archive: 'a/one.obj', 'a/two.obj', 'b/one.stl', 'c.ply', …"), "{text}");
+    let loaded = read("a/two.obj").unwrap();
+    assert_eq!(names(&loaded), [path.join("a/two.obj").to_str().unwrap()]);
+    assert_eq!(loaded.warnings[0].code, "file-missing", "its library of materials");
+    let (code, text) = fault(read("a/tow.obj"));
+    assert!(code == "file-missing" && text.contains("pack.ZIP/a/two.obj'?"), "{code}: {text}");
+    let (code, text) = fault(read("zebra"));
+    assert!(code == "file-missing" && text.contains("it has 5 models, the first is"), "{code}: {text}");
+    assert_eq!(fault(read("a")).0, "file-not-plain");
+    assert!(matches!(load(&dir.path().join("gone.zip/a.obj"), &LoadOptions::default()), Err(LoadError::Read { .. })));
+}
+
+#[test]
+fn what_a_model_names_is_looked_for_in_its_archive_and_nowhere_else() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    fs::write(at("paint.mtl"), MTL).unwrap();
+    // Above the model, in another case, with backslashes and a folder of another machine.
+    for (library, found) in [
+        ("../lib/paint.mtl", true),
+        ("..\\LIB\\Paint.MTL", true),
+        ("C:\\work\\lib\\paint.mtl", false),
+        ("../../paint.mtl", false),
+        ("../a.zip/lib/paint.mtl", false),
+    ] {
+        let obj = OBJ.replace("paint.mtl", library);
+        fs::write(at("a.zip"), zip(&[("source\\a.obj", obj.as_bytes()), ("lib/paint.mtl", MTL)])).unwrap();
+        let loaded = load(&at("a.zip"), &LoadOptions::default()).unwrap();
+        assert_eq!(names(&loaded).len() == 2, found, "{library}: {:?}", loaded.warnings);
+    }
+    let loaded = of_bytes(&[("a.obj", OBJ.replace("paint.mtl", "../paint.mtl").as_bytes())]).unwrap();
+    assert_eq!(loaded.warnings[0].code, "file-outside-root");
+    assert!(loaded.warnings[0].remedy.starts_with("unpack it"), "{}", loaded.warnings[0]);
+}
+
+#[test]
+fn scene_files_show_models_in_archives() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let files: [(&str, &[u8]); 3] =
+        [("m/house.obj", OBJ.as_bytes()), ("m/paint.mtl", MTL), ("scene.toml", b"[[models]]\nfile = 'm/house.obj'\n")];
+    fs::write(at("house.zip"), zip(&files)).unwrap();
+    for (name, read) in [("house.zip", 3), ("house.zip/m/house.obj", 3), ("house.zip/gone.obj", 0), ("../house.zip", 0)]
+    {
+        fs::write(at("scene.toml"), format!("[[models]]\nfile = '{name}'\n")).unwrap();
+        let loaded = load(&at("scene.toml"), &LoadOptions::default());
+        assert_eq!(loaded.as_ref().map_or(0, |loaded| loaded.facts.files.len()), read, "{name}: {loaded:?}");
+        let folder = dir.path();
+        loaded.iter().for_each(|loaded| assert_eq!(loaded.facts.files[1].path, folder.join("house.zip/m/house.obj")));
+    }
+    // One in an archive, and one in memory, beside their models.
+    for loaded in [load(&at("house.zip/scene.toml"), &LoadOptions::default()), of_bytes(&files)] {
+        assert_eq!(loaded.unwrap().scene.prims(), 1);
+    }
+}
+
+#[test]
+fn archives_without_models_say_what_they_hold() {
+    let (code, text) = fault(of_bytes(&[]));
+    assert!(code == "archive-empty" && text.contains("this archive is empty"), "{code}: {text}");
+    let (code, text) = fault(of_bytes(&[("textures/a.png", b"1"), ("robot.fbx", b"2")]));
+    assert_eq!(code, "archive-empty");
+    assert!(text.contains("it has 'robot.fbx', 'textures/a.png';"), "{text}");
+}
+
+#[test]
+fn nothing_leads_out_of_an_archive() {
+    let names = ["../../etc/a.obj", "/rooted/b.obj", "x/../c.obj", "x/../../d.obj", "./e.obj", "C:\\f.obj"];
+    let bytes = zip_verbatim(&names);
+    let archive = Archive::from_bytes(Path::new("a.zip"), bytes).unwrap();
+    let held: Vec<&str> = archive.models().collect();
+    assert_eq!(held, ["C:/f.obj", "c.obj", "e.obj", "rooted/b.obj"]);
+    assert!(!archive.has(Path::new("../a.zip/c.obj")) && archive.names_in(Path::new("..")).next().is_none());
+    assert_eq!(archive.names_in(Path::new("rooted")).collect::<Vec<_>>(), ["b.obj"]);
+    assert!(archive.has_folder(Path::new("")) && !archive.has_folder(Path::new("root")));
+}
+
+/// An archive of empty files whose names are as they are given.
+fn zip_verbatim(names: &[&str]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut archive = ZipArchiveWriter::new(&mut bytes);
+    for name in names {
+        let path = rawzip::path::EntryPath::verbatim(name.as_bytes());
+        let (entry, config) = archive.new_file(path).compression_method(CompressionMethod::STORE).start().unwrap();
+        let (_, descriptor) = config.wrap(Vec::new()).finish().unwrap();
+        entry.finish(descriptor).unwrap();
+    }
+    archive.finish().unwrap();
+    bytes
+}
+
+#[test]
+fn a_spoiled_file_is_told_and_none_is_unpacked_to_more_than_it_says() {
+    let long = vec![b'x'; 100_000];
+    let whole = zip(&[("a.bin", b"stored as it is"), ("long.txt", &long)]);
+    let read =
+        |bytes: Vec<u8>, name: &str| Archive::from_bytes(Path::new("a.zip"), bytes)?.read(Path::new(name), 1 << 20);
+    assert_eq!(read(whole.clone(), "a.bin").unwrap(), b"stored as it is");
+    assert_eq!(read(whole.clone(), "long.txt").unwrap(), long);
+    let archive = Archive::from_bytes(Path::new("a.zip"), whole.clone()).unwrap();
+    assert_eq!(archive.read(Path::new("long.txt"), 99_999).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+    assert_eq!(archive.unpacked(), 100_015);
+    // A letter of what is stored.
+    let at = whole.windows(6).position(|w| w == b"stored").unwrap();
+    let mut spoiled = whole.clone();
+    spoiled[at] = b'S';
+    let error = read(spoiled, "a.bin").unwrap_err();
+    assert!(matches!(of_archive(&error), Some(ArchiveFault::Spoiled(why)) if why.contains("checksum")), "{error}");
+    // What the directory says of a length: 100 000 -> 5.
+    let at = whole.windows(4).rposition(|w| w == 100_000_u32.to_le_bytes()).unwrap();
+    let mut lying = whole.clone();
+    lying[at..at + 4].copy_from_slice(&5_u32.to_le_bytes());
+    let error = read(lying, "long.txt").unwrap_err();
+    assert!(matches!(of_archive(&error), Some(ArchiveFault::Spoiled(_))), "{error}");
+    // The flags and the method of the first entry of the directory.
+    let at = whole.windows(4).position(|w| w == b"PK\x01\x02").unwrap();
+    for (offset, value, expected) in [
+        (8, 1, "it is encrypted"),
+        (10, 9, "it is packed by DEFLATE64, which is not known here"),
+        (10, 77, "it is packed by method 77, which is not known here"),
+    ] {
+        let mut other = whole.clone();
+        other[at + offset] = value;
+        assert_eq!(of_archive(&read(other, "a.bin").unwrap_err()).unwrap().to_string(), expected);
+    }
+}
+
+#[test]
+fn a_cut_or_garbled_archive_never_panics() {
+    let whole = zip(&[("a.obj", OBJ.as_bytes()), ("paint.mtl", MTL)]);
+    for end in 0..whole.len() {
+        let loaded = load_bytes(Path::new("a.zip"), whole[..end].to_vec(), &LoadOptions::default());
+        assert!(loaded.is_err(), "{end} of {} bytes", whole.len());
+    }
+    for at in 4..whole.len() {
+        for value in [0, 0xff, whole[at] ^ 1] {
+            let mut garbled = whole.clone();
+            garbled[at] = value;
+            drop(load_bytes(Path::new("a.zip"), garbled, &LoadOptions::default()));
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! Zip archives: models as they are downloaded.
+
+use super::program::{CUBE, Folder, textured_cube};
+use rawzip::{CompressionMethod, ZipArchiveWriter};
+use std::io::Write;
+
+/// A zip archive of files by name, stored as they are.
+fn zip(files: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut archive = ZipArchiveWriter::new(&mut bytes);
+    for (name, content) in files {
+        let (mut entry, config) = archive.new_file(name).compression_method(CompressionMethod::STORE).start().unwrap();
+        let mut writer = config.wrap(&mut entry);
+        writer.write_all(content).unwrap();
+        let (_, descriptor) = writer.finish().unwrap();
+        entry.finish(descriptor).unwrap();
+    }
+    archive.finish().unwrap();
+    bytes
+}
+
+/// A textured cube in an archive, called as every model of a well-known site is, and two models in another.
+fn downloads() -> Folder {
+    let cube = textured_cube();
+    let names = cube.names();
+    let bytes: Vec<Vec<u8>> = names.iter().map(|name| cube.read(name)).collect();
+    let files: Vec<(String, &[u8])> =
+        names.iter().zip(&bytes).map(|(name, bytes)| (format!("source/{name}"), &bytes[..])).collect();
+    let files: Vec<(&str, &[u8])> = files.iter().map(|(name, bytes)| (&name[..], *bytes)).collect();
+    let several = zip(&[("a/one.obj", CUBE.as_bytes()), ("b/two.obj", CUBE.as_bytes()), ("readme.txt", b"")]);
+    Folder::new().file("all/cube.zip", zip(&files)).file("all/pack.zip", several)
+}
+
+#[test]
+fn the_model_of_an_archive_is_drawn_as_it_is_unpacked_and_under_the_name_of_the_archive() {
+    let (folder, unpacked) = (downloads(), textured_cube());
+    folder.render(&["all/cube.zip"]).ends(0);
+    assert_eq!(folder.names(), ["all", "cube.png"]);
+    let model = unpacked.names().into_iter().find(|name| name.ends_with(".obj")).unwrap();
+    unpacked.render(&[&model, "-o", "unpacked.png"]).ends(0);
+    let pixels = |folder: &Folder, name: &str| super::program::picture(&folder.path(name)).beauty;
+    assert_eq!(pixels(&folder, "cube.png"), pixels(&unpacked, "unpacked.png"));
+    folder.run(&["render", "--again", "cube.png", "-o", "again.png"]).ends(0);
+    assert!(folder.read("cube.png") == folder.read("again.png"));
+    folder.run(&["inspect", "all/cube.zip"]).ends(0);
+}
+
+#[test]
+fn an_archive_with_several_models_is_a_folder_of_them() {
+    let folder = downloads();
+    folder.render(&["all", "-o", "thumbs/", "--update"]).ends(0).says(&["3 pictures of 3 inputs, 0 up to date"]);
+    for name in ["thumbs/cube.png", "thumbs/pack.zip/a/one.png", "thumbs/pack.zip/b/two.png"] {
+        assert!(folder.has(name), "{name}");
+    }
+    folder.render(&["all", "-o", "thumbs/", "--update"]).ends(0).says(&["0 pictures of 3 inputs, 3 up to date"]);
+    // Another model in the archive: the others are the same as they were.
+    let changed = CUBE.replacen("1", "1.25", 1);
+    std::fs::write(
+        folder.path("all/pack.zip"),
+        zip(&[("a/one.obj", CUBE.as_bytes()), ("b/two.obj", changed.as_bytes())]),
+    )
+    .unwrap();
+    folder.render(&["all", "-o", "thumbs/", "--update"]).ends(0).says(&["1 picture of 3 inputs, 2 up to date"]);
+    folder
+        .render(&["all/pack.zip/b/two.obj", "all/pack.zip", "-o", "{sub}/{stem}.jpg"])
+        .ends(0)
+        .says(&["2 pictures of 2 inputs"]);
+    assert!(folder.has("a/one.jpg") && folder.has("b/two.jpg"));
+    folder.run(&["inspect", "all/pack.zip"]).ends(3).says(&["2 models", "'a/one.obj'", "name one"]);
+}
+
+#[test]
+fn an_archive_that_is_damaged_is_told_and_keeps_nobody_up() {
+    let folder =
+        downloads().file("all/cut.zip", &b"PK\x03\x04\0\0"[..]).file("all/pictures.zip", zip(&[("a.png", b"")]));
+    folder.render(&["all", "-o", "thumbs/"]).ends(3).says(&[
+        "cut.zip",
+        "damaged",
+        "get the archive again",
+        "3 pictures of 3 inputs",
+    ]);
+    folder.render(&["all/pictures.zip"]).ends(3).says(&["no model is in this archive", "'a.png'"]);
+    folder.render(&["all/cut.zip"]).ends(3).says(&["damaged"]);
+}
+
+#[test]
+fn no_output_replaces_an_archive_that_is_read() {
+    let folder = downloads();
+    std::fs::rename(folder.path("all/pack.zip"), folder.path("pack.json")).unwrap();
+    let before = folder.read("pack.json");
+    folder
+        .run(&["bench", "pack.json/a/one.obj", "--report", "pack.json"])
+        .ends(1)
+        .says(&["pack.json", "would replace a file that is read"]);
+    assert!(folder.read("pack.json") == before);
+}
