@@ -2,6 +2,7 @@
 
 use super::Settings;
 use super::absorption::Absorption;
+use super::ahead::Ahead;
 use super::certainty;
 use super::clearings::{Before, Clearings, Cones};
 use super::fireflies::Fireflies;
@@ -76,6 +77,10 @@ pub(crate) struct Context<'a> {
     pub meets_by_chance: bool,
     /// What such rays were found to meet seldom, and far brighter than all else, if anybody has looked.
     pub fireflies: Option<Arc<Fireflies>>,
+    /// Samples that pixels start with, at least: as many as were traced before the picture.
+    pub first_samples: u32,
+    /// These.
+    pub ahead: Option<Arc<Ahead>>,
     /// How far highlights are spread, in widths of a ray's cone.
     pub highlight_reach: f32,
     /// For every random choice.
@@ -164,6 +169,8 @@ impl<'a> Context<'a> {
             gloss,
             meets_by_chance: settings.lens.is_some() || spreads,
             fireflies: None,
+            first_samples: 1,
+            ahead: None,
             highlight_reach: glint::reach(settings),
             seed: settings.seed,
             points_at_a_time: points_at_a_time(&lights, light_rays, env_rays, gloss),

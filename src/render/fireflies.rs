@@ -4,8 +4,10 @@
 //! agree and look certain, and are darker than they should be by all that it adds. So one sample of a part of the pixels, or of a
 //! small picture some of each, is traced before the picture, and some more of those that show something bright. Where some of
 //! these are fireflies, pixels near them whose own samples are spread by chance are not certain before they have met one, too, or
-//! so many of their samples have not that it matters little.
+//! so many of their samples have not that it matters little. Where all pixels are asked, their samples are the first ones of the
+//! picture ([`Ahead`]).
 
+use super::ahead::Ahead;
 use super::by_class::ByClass;
 use super::certainty::{Certainty, output};
 use super::context::Context;
@@ -17,7 +19,7 @@ use super::sampling::{Sampling, Stochastic};
 use super::stochastic::{Places, Wanted};
 use super::tile::{TILE, TOGETHER, Tile, each_tile, tiles};
 use super::whitted::{Sample, Tracer};
-use super::{Job, Progress};
+use super::{Job, Progress, Settings};
 use crate::accel::Accel;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -26,7 +28,7 @@ const STEP: u32 = 2;
 /// To foretell what a picture takes one in so many of these.
 const HINT: u32 = 4;
 const SMALL: u64 = 1 << 16;
-/// Of fewer pixels each is asked for more samples until they are as many, but for no more than so many.
+/// Of fewer pixels each is asked for more samples until they are nearly as many, but for no more than so many.
 const MOST: u32 = 16;
 
 /// Of a pixel that shows something bright so many more samples are taken, …
@@ -108,10 +110,10 @@ fn pixels(width: u32, height: u32) -> u64 {
     u64::from(width) * u64::from(height)
 }
 
-/// Samples that each pixel that is asked is asked for.
+/// Samples that each pixel that is asked is asked for, a power of two.
 fn samples(width: u32, height: u32) -> u32 {
     let samples = SMALL / pixels(width, height).max(1);
-    u32::try_from(samples).map_or(MOST, |samples| samples.clamp(1, MOST))
+    u32::try_from(samples).map_or(MOST, |samples| 1 << samples.clamp(1, MOST).ilog2())
 }
 
 /// The pixel, and what its sample shows.
@@ -145,6 +147,22 @@ impl Closely {
     }
 }
 
+/// Eye rays that looking took.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Rays {
+    pub all: u64,
+    /// Those that are not of the picture.
+    pub beside: u64,
+}
+
+/// So many of the first samples of all pixels are asked for that they are the picture's own, if they are: `None` in large ones,
+/// and where an error of the whole picture is aimed at, of which several are rendered.
+fn of_picture(settings: &Settings, how: &Stochastic) -> Option<u32> {
+    let (width, height) = (settings.width, settings.height);
+    let are = how.target.is_none() && Closely::All.step(width, height) == 1;
+    are.then(|| samples(width, height).min(how.powers().1))
+}
+
 /// Looks for them where pixels are sampled until they are certain and rays may be spread by chance, and tells the context; eye
 /// rays that it took, and the counts of all threads.
 pub(super) fn look<P: Observer>(
@@ -152,26 +170,30 @@ pub(super) fn look<P: Observer>(
     context: &mut Context,
     closely: Closely,
     progress: &dyn Progress,
-) -> (u64, Vec<ByClass<P>>) {
+) -> (Rays, Vec<ByClass<P>>) {
     let Job { accel, view, settings, .. } = *job;
-    let Sampling::Stochastic(how) = &settings.sampling else { return (0, Vec::new()) };
+    let Sampling::Stochastic(how) = &settings.sampling else { return (Rays::default(), Vec::new()) };
     if !context.meets_by_chance {
-        return (0, Vec::new());
+        return (Rays::default(), Vec::new());
     }
     let (width, height) = (settings.width, settings.height);
     let step = closely.step(width, height);
-    let samples = samples(width, height);
+    let of_picture = of_picture(settings, how);
+    let samples = of_picture.unwrap_or_else(|| samples(width, height));
+    let ahead =
+        of_picture.filter(|_| matches!(closely, Closely::All)).map(|_| Mutex::new(Ahead::new(settings, samples)));
     let question = Question { frame: &Frame::new(context, accel, view, settings), how, step, samples };
     let grid = Grid::new(width.div_ceil(step) as usize, height.div_ceil(step) as usize);
     let asked = Mutex::new(vec![grid; samples as usize]);
     let work = |tracer: &mut Tracer<_, P>, &tile: &Tile| {
-        let answers = question.ask(tracer, tile)?;
+        let answers = question.ask(tracer, tile, ahead.as_ref())?;
         let mut asked = asked.lock().unwrap_or_else(PoisonError::into_inner);
         asked.iter_mut().zip(&answers).for_each(|(grid, answers)| grid.put(answers, step));
         Some(answers.iter().map(Vec::len).sum::<usize>() as u64)
     };
     let (each, mut counts, complete) = each_tile(context, accel, &tiles(width, height), &Quiet(progress), work);
-    let mut rays = each.into_iter().sum();
+    let all = each.into_iter().sum();
+    let mut rays = Rays { all, beside: if of_picture.is_some() { 0 } else { all } };
     // Who has cancelled wants no more of the picture, either.
     if !complete {
         return (rays, counts);
@@ -185,12 +207,16 @@ pub(super) fn look<P: Observer>(
     let (answers, more, complete) = each_tile(context, accel, &some, &Quiet(progress), work);
     counts.extend(more);
     if complete {
-        rays += pixels.len() as u64 * u64::from(AGAIN);
+        let again = pixels.len() as u64 * u64::from(AGAIN);
+        (rays.all, rays.beside) = (rays.all + again, rays.beside + again);
         let (rare, told) = (answers.into_iter().flatten().collect(), in_cells(&asked, (CELL / step) as usize));
         let output = output(how.space, question.frame.background);
         let judge = Certainty::of(question.frame, how, output.as_ref(), context.scene.background);
         let missing = |light, more| judge.grey(light + more) - judge.grey(light);
-        context.fireflies = Some(Arc::new(Fireflies::among(rare, &told, missing, missed_at_most(how))));
+        let fireflies = Arc::new(Fireflies::among(rare, &told, missing, missed_at_most(how)));
+        context.fireflies = Some(fireflies);
+        context.first_samples = of_picture.unwrap_or(1);
+        context.ahead = ahead.map(|ahead| Arc::new(ahead.into_inner().unwrap_or_else(PoisonError::into_inner)));
     }
     (rays, counts)
 }
@@ -228,13 +254,22 @@ impl Question<'_> {
     }
 
     /// Asks one pixel of each square of `step` columns and rows of a tile; what their first samples say, their second ones, and
-    /// so on. `None` when cancelled.
-    fn ask<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, tile: Tile) -> Option<Vec<Vec<Answer>>> {
+    /// so on. They are kept if they are the picture's. `None` when cancelled.
+    fn ask<A: Accel, P: Observer>(
+        &self,
+        tracer: &mut Tracer<A, P>,
+        tile: Tile,
+        ahead: Option<&Mutex<Ahead>>,
+    ) -> Option<Vec<Vec<Answer>>> {
         let is_asked = |(x, y): &(u32, u32)| x % self.step == 0 && y % self.step == 0;
         let (columns, rows): (Vec<u32>, Vec<u32>) = tile.places().filter(is_asked).unzip();
         let mut places = Places::default();
         let each = (0..self.samples).map(|index| {
             places.trace_each(self.frame, self.how, tracer, (index, &columns, &rows))?;
+            if let Some(ahead) = ahead {
+                let mut ahead = ahead.lock().unwrap_or_else(PoisonError::into_inner);
+                ahead.keep(index, (&columns, &rows), tracer);
+            }
             let samples = tracer.samples.iter().zip(&tracer.by_chance);
             let asked = samples.map(|(sample, &by_chance)| Asked { light: self.light(sample), by_chance });
             Some(columns.iter().copied().zip(rows.iter().copied()).zip(asked).collect())
@@ -430,6 +465,7 @@ mod tests {
             [(256, 256), (1024, 768), (128, 256), (64, 64), (9, 5)].map(|(w, h)| samples(w, h)),
             [1, 1, 2, 16, 16]
         );
+        assert_eq!(samples(100, 100), 4, "a power of two");
         let one = |light| Asked { light, by_chance: true };
         let layer = |light| Grid { columns: 3, rows: 1, each: vec![one(light), one(9.0), Asked::NOTHING] };
         let (told, columns) = in_cells(&[layer(0.25), layer(0.5)], 2);

@@ -79,7 +79,9 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
         _ => (job.settings.clone(), 1.0, (0.0, 0.0)),
     };
     let times = Closely::Hint.part() as f64;
-    let before = (before.0 + looked as f64 * times, before.1 + if looked > 0 { spent * times } else { 0.0 });
+    // What the picture has of that is in its parts.
+    let beside = looked.beside as f64 / looked.all.max(1) as f64;
+    let before = (before.0 + looked.beside as f64 * times, before.1 + spent * beside * times);
     let squares = squares(settings.width, settings.height);
     let timed = Part::<NoProbe>::render(job, &context, &settings, &squares, progress)?;
     let other = Settings { seed: target::seed(settings.seed, 1), ..settings.clone() };

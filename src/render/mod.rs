@@ -11,6 +11,7 @@
 
 mod absorption;
 mod adaptive;
+mod ahead;
 mod asking;
 mod beside;
 mod branch;
@@ -309,8 +310,8 @@ fn render_with<P: Observer>(
             tile::render_tiles(&context, job.accel, job.view, settings, progress);
         (Rendered { picture, counts: ClassCounts::default(), sampled, depth: context.depth, complete }, counts)
     });
-    rendered.sampled.looked = rays;
-    rendered.sampled.rays += rays;
+    rendered.sampled.looked = rays.beside;
+    rendered.sampled.rays += rays.beside;
     counts.extend(more);
     (rendered, counts)
 }

@@ -200,7 +200,8 @@ pub struct Sampled {
     pub errors: Vec<f32>,
     /// Eye rays in all.
     pub rays: u64,
-    /// Of them those that were sent before the picture, to find what rays that are spread by chance seldom meet.
+    /// Of them those that were sent before the picture, to find what rays that are spread by chance seldom meet, and are none of
+    /// its own.
     pub looked: u64,
     /// Pixels whose mean became as certain as was asked.
     pub met: u64,

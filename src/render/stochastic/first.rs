@@ -5,6 +5,7 @@ use super::around::Around;
 use super::pixel::Pixel;
 use super::places::Places;
 use crate::accel::Accel;
+use crate::render::ahead::OfPixel;
 use crate::render::certainty::{Pixels, Shown};
 use crate::render::fireflies::Fireflies;
 use crate::render::frame::Frame;
@@ -43,11 +44,20 @@ impl Sampler<'_> {
         }
         let (mut samples, mut by_chance, mut firsts) = (Vec::with_capacity(count), Vec::new(), Vec::new());
         let mut places = Places::default();
-        for (columns, rows) in columns.chunks(TOGETHER).zip(rows.chunks(TOGETHER)) {
-            places.trace_each(self.frame, self.how, tracer, (0, columns, rows))?;
-            samples.extend_from_slice(&tracer.samples);
-            by_chance.extend_from_slice(&tracer.by_chance);
-            firsts.extend_from_slice(&tracer.firsts);
+        if let Some(ahead) = self.ahead {
+            for at in columns.iter().copied().zip(rows.iter().copied()) {
+                let OfPixel { samples: own, by_chance: spread, firsts: surfaces } = ahead.of(at, 0..1);
+                samples.extend_from_slice(own);
+                by_chance.extend_from_slice(spread);
+                firsts.extend_from_slice(surfaces);
+            }
+        } else {
+            for (columns, rows) in columns.chunks(TOGETHER).zip(rows.chunks(TOGETHER)) {
+                places.trace_each(self.frame, self.how, tracer, (0, columns, rows))?;
+                samples.extend_from_slice(&tracer.samples);
+                by_chance.extend_from_slice(&tracer.by_chance);
+                firsts.extend_from_slice(&tracer.firsts);
+            }
         }
         let (shown, pixels) = self.judge.see_samples(&samples);
         Some(First { parts, samples, by_chance, firsts, pixels, shown })

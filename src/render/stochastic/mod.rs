@@ -14,6 +14,7 @@ mod shared;
 mod variances;
 
 use super::Settings;
+use super::ahead::{Ahead, OfPixel};
 use super::certainty::{Certainty, GROUPS, SURE, output};
 use super::context::Context;
 use super::fireflies::Fireflies;
@@ -51,7 +52,8 @@ pub(super) fn render<A: Accel, P: Observer>(
     let outermost = sampler.grown(tile, sampler.reach());
     let first = sampler.first(tracer, std::iter::once(tile).chain(outermost.without(tile)))?;
     let mut done = sampler.finish(tracer, tile, &[&first])?;
-    done.rays_beyond = (outermost.pixels() - tile.pixels()) as u64;
+    let beyond = if sampler.ahead.is_some() { 0 } else { outermost.pixels() - tile.pixels() };
+    done.rays_beyond = beyond as u64;
     done.rays += done.rays_beyond;
     Some(done)
 }
@@ -62,6 +64,8 @@ struct Sampler<'a> {
     how: &'a Stochastic,
     judge: Certainty<'a>,
     fireflies: Option<&'a Fireflies>,
+    /// First samples of all pixels that are there already.
+    ahead: Option<&'a Ahead>,
     /// Samples of a pixel after each round.
     rounds: Vec<u32>,
 }
@@ -84,7 +88,9 @@ impl<'a> Sampler<'a> {
     fn new(frame: &'a Frame, how: &'a Stochastic, output: Option<&'a Output>, context: &'a Context) -> Self {
         let judge = Certainty::of(frame, how, output, context.scene.background);
         let fireflies = context.fireflies.as_deref();
-        Self { frame, how, judge, fireflies, rounds: rounds(how, frame.settings).collect() }
+        let ahead = context.ahead.as_deref().filter(|ahead| ahead.samples(frame.settings.seed) > 0);
+        let rounds = rounds(how, frame.settings, context.first_samples).collect();
+        Self { frame, how, judge, fireflies, ahead, rounds }
     }
 
     /// Whether all pixels get a single sample at first.
@@ -280,12 +286,13 @@ impl<'a> Sampler<'a> {
     fn put(&self, pixels: &[Pixel], counted: u32, done: &mut TilePixels) {
         let (frame, tile) = (self.frame, done.tile);
         for pixel in pixels {
-            let rays = u64::from(pixel.facts.count - counted);
-            done.rays += rays;
             if !tile.contains(pixel.at) {
-                done.rays_around += rays;
+                // They are their own tile's, too; what is there already nobody traces again.
+                let rays = u64::from(pixel.facts.count - counted.max(self.known(0..pixel.facts.count)));
+                (done.rays, done.rays_around) = (done.rays + rays, done.rays_around + rays);
                 continue;
             }
+            done.rays += u64::from(pixel.facts.count - counted);
             let i = tile.number(pixel.at);
             let (color, veil) = pixel.sum().resolve(frame.background);
             (done.beauty[i], done.facts[i]) = (color, pixel.facts);
@@ -295,6 +302,12 @@ impl<'a> Sampler<'a> {
                 done.layers[i] = layers.pixel(frame.view.eye, frame.view.forward);
             }
         }
+    }
+
+    /// How many of these samples, from the first on, are there already.
+    fn known(&self, samples: Range<u32>) -> u32 {
+        let known = self.ahead.map_or(0, |ahead| ahead.samples(self.frame.settings.seed));
+        known.clamp(samples.start, samples.end) - samples.start
     }
 
     /// Traces what these pixels are missing of so many samples, round by round.
@@ -325,6 +338,19 @@ impl<'a> Sampler<'a> {
         }
         let first = samples.start;
         let in_group = (samples.end as usize).div_ceil(GROUPS);
+        let known = first..first + self.known(samples.clone());
+        let samples = known.end..samples.end;
+        if let Some(ahead) = self.ahead.filter(|_| !known.is_empty()) {
+            for &pixel in active {
+                let pixel = &mut pixels[pixel];
+                let OfPixel { samples, by_chance, firsts } = ahead.of(pixel.at, known.clone());
+                pixel.expect(self.fireflies, by_chance);
+                pixel.take(samples, firsts, in_group);
+            }
+        }
+        if samples.is_empty() {
+            return Some(());
+        }
         for some in active.chunks((TOGETHER / samples.len().max(1)).max(1)) {
             for start in samples.clone().step_by(TOGETHER) {
                 let samples = start..samples.end.min(start + TOGETHER as u32);
@@ -347,13 +373,13 @@ impl<'a> Sampler<'a> {
     }
 }
 
-/// Samples of a pixel after each round: the fewest, but then at least [`SURE`], then twice as many from round to round,
+/// Samples of a pixel after each round: the fewest, no fewer than `known`, but then at least [`SURE`], then twice as many from round to round,
 /// powers of two throughout, as these many points of the sequence lie most evenly.
-fn rounds(how: &Stochastic, settings: &Settings) -> impl Iterator<Item = u32> + use<> {
+fn rounds(how: &Stochastic, settings: &Settings, known: u32) -> impl Iterator<Item = u32> + use<> {
     let (fewest, most) = how.powers();
     // In a single row or column there are not enough pixels beside one.
-    let least = if settings.width.min(settings.height) < 2 { SURE } else { 1 };
-    std::iter::successors(Some(fewest.max(least).min(most)), move |&last| {
+    let least = if settings.width.min(settings.height) < 2 { SURE } else { known };
+    std::iter::successors(Some(fewest.max(least).max(known).min(most)), move |&last| {
         (last < most).then(|| (2 * last).max(SURE).min(most))
     })
 }
@@ -370,16 +396,20 @@ mod tests {
 
     #[test]
     fn rounds_double_and_end_at_the_most() {
-        let rounds_of = |min_samples, max_samples, height| {
+        let rounds_from = |known, min_samples, max_samples, height| {
             let settings = Settings { width: 16, height, ..Settings::default() };
-            super::rounds(&Stochastic { min_samples, max_samples, ..Stochastic::default() }, &settings)
-                .collect::<Vec<_>>()
+            let how = Stochastic { min_samples, max_samples, ..Stochastic::default() };
+            super::rounds(&how, &settings, known).collect::<Vec<_>>()
         };
+        let rounds_of = |min_samples, max_samples, height| rounds_from(1, min_samples, max_samples, height);
         let rounds = |min_samples, max_samples| rounds_of(min_samples, max_samples, 9);
         assert_eq!(rounds(1, 64), [1, 4, 8, 16, 32, 64]);
         assert_eq!(rounds(2, 8), [2, 4, 8]);
         assert_eq!(rounds(1, 2), [1, 2]);
         assert_eq!(rounds_of(1, 16, 1), [4, 8, 16], "of a single row");
+        assert_eq!(rounds_from(8, 1, 64, 9), [8, 16, 32, 64], "of so many that are known");
+        assert_eq!(rounds_from(2, 1, 16, 1), [4, 8, 16]);
+        assert_eq!(rounds_from(16, 1, 8, 9), [8]);
         assert_eq!(rounds(4, 256), [4, 8, 16, 32, 64, 128, 256]);
         assert_eq!(rounds(4, 100), [4, 8, 16, 32, 64]);
         assert_eq!(rounds(30, 256), [32, 64, 128, 256]);
