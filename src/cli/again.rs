@@ -364,7 +364,7 @@ fn found(input: &str, picture: &Path) -> PathBuf {
         return named;
     }
     let beside = named.file_name().map(|name| folder.join(name));
-    [Some(folder.join(&named)), beside].into_iter().flatten().find(|path| path.exists()).unwrap_or(named)
+    [Some(folder.join(&named)), beside].into_iter().flatten().find(|path| archive::is_there(path)).unwrap_or(named)
 }
 
 fn parse_settings(settings: &Map<String, Value>) -> Result<RenderArgs, String> {

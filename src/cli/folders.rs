@@ -1,66 +1,51 @@
 //! Folders among the inputs, and archives with several models: all models in them, and where in them each lies.
 
 use super::exit::Exit;
-use crate::load::archive::{self, Archive, is_called_an_archive};
+use super::message::Severity;
+use crate::load::archive::{ArchiveFault, in_archive, is_called_an_archive, opened, split};
 use crate::load::{Diagnostic, is_called_a_model};
 use std::collections::HashSet;
+use std::ffi::OsStr;
 use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
 /// The inputs, with all models in a folder, and in those in it, in its place, in the order of their names, each once. What is
 /// hidden is left out, and links to folders are not followed. Scene files are no models: they are rendered where they are named.
-/// A zip archive with one model stands for that, and one with several is a folder.
+/// A zip archive with one model stands for that, and one with several is a folder, as are folders in it. In a folder one is left
+/// out that was unpacked there: beside a folder or a model of its name.
 ///
-/// `tell` hears of folders without a model, and of those that cannot be read; how the command ends because of these, too.
-pub(super) fn unfold(inputs: &[PathBuf], mut tell: impl FnMut(&Diagnostic)) -> (Vec<PathBuf>, Exit) {
+/// `tell` hears of folders without a model, of those that cannot be read, and of what is left out; how the command ends because
+/// of these, too.
+pub(super) fn unfold(inputs: &[PathBuf], mut tell: impl FnMut(Severity, &Diagnostic)) -> (Vec<PathBuf>, Exit) {
     let (mut models, mut ended) = (Vec::new(), Exit::Done);
     let mut known: HashSet<PathBuf> = inputs.iter().filter(|input| !is_folder(input)).cloned().collect();
     for input in inputs {
-        if !is_folder(input) {
-            let several = is_archive(input).then(|| models_of(input).ok()).flatten().filter(|found| found.len() > 1);
-            match several {
-                Some(found) => models.extend(found.into_iter().filter(|model| known.insert(model.clone()))),
-                // What is wrong with an archive is told where it is loaded.
-                None => models.push(input.clone()),
+        let mut found = Found::default();
+        if is_folder(input) {
+            found.add_folder(input);
+            if found.models.is_empty() && found.told.is_empty() {
+                let remedy =
+                    "name one with .glb, .gltf, .vrm, .obj, .ply, .stl, .nff or .zip files, or a scene file itself";
+                let fault = Diagnostic::new("folder-empty", input, "", "no model is in this folder").remedy(remedy);
+                found.told.push((Severity::Error, fault, Exit::Input));
             }
-            continue;
+        } else if !found.add_several(input) {
+            models.push(input.clone());
         }
-        let (found, faults) = models_in(input);
-        if found.is_empty() && faults.is_empty() {
-            let remedy =
-                "name one with .glb, .gltf, .vrm, .obj, .ply, .stl, .nff or .zip files, or a scene file itself";
-            tell(&Diagnostic::new("folder-empty", input, "", "no model is in this folder").remedy(remedy));
-            ended = ended.max(Exit::Input);
-        }
-        for (fault, exit) in faults {
-            tell(&fault);
+        for (severity, what, exit) in found.told {
+            tell(severity, &what);
             ended = ended.max(exit);
         }
-        models.extend(found.into_iter().filter(|model| known.insert(model.clone())));
+        models.extend(found.models.into_iter().filter(|model| known.insert(model.clone())));
     }
     (models, ended)
 }
 
-/// The folders among the inputs, and the archives.
+/// The folders among the inputs, and the archives, and folders in these.
 pub(super) fn of(inputs: &[PathBuf]) -> Vec<PathBuf> {
-    inputs.iter().filter(|input| is_folder(input) || is_archive(input)).cloned().collect()
-}
-
-/// Whether it is a file with the name of an archive.
-fn is_archive(input: &Path) -> bool {
-    is_called_an_archive(input) && input.is_file()
-}
-
-/// What the models in an archive are called among the inputs: one alone as the archive.
-fn models_of(path: &Path) -> io::Result<Vec<PathBuf>> {
-    // What is none, whatever its name, has no models.
-    let Some(archive) = Archive::open(path)? else { return Ok(Vec::new()) };
-    let names: Vec<&str> = archive.models().collect();
-    Ok(match names[..] {
-        [_] => vec![path.to_path_buf()],
-        _ => names.iter().map(|name| path.join(name)).collect(),
-    })
+    let holds = |input: &&PathBuf| is_folder(input) || is_archive(input) || is_folder_in_archive(input);
+    inputs.iter().filter(holds).cloned().collect()
 }
 
 /// Whether it is a folder, whatever lies there under the name of standard input.
@@ -68,60 +53,131 @@ fn is_folder(input: &Path) -> bool {
     input != Path::new("-") && input.is_dir()
 }
 
-/// The way from the first of these folders that an input lies in to the input's own; empty if that is the same.
+/// Whether it is a file with the name of an archive.
+fn is_archive(input: &Path) -> bool {
+    is_called_an_archive(input) && without_slash(input).is_file()
+}
+
+/// Whether it is a folder in an archive.
+fn is_folder_in_archive(input: &Path) -> bool {
+    in_archive(input).is_ok_and(|found| found.is_some_and(|(archive, name)| archive.has_folder(name)))
+}
+
+/// A path that ends in a name.
+fn without_slash(path: &Path) -> PathBuf {
+    path.components().collect()
+}
+
+/// The way from the first of these folders that an input lies in to the input's own; empty if that is the same. An archive on
+/// that way is a folder with its name but for the extension, and so is one that was named itself.
 pub(super) fn way_below(folders: &[PathBuf], input: &Path) -> PathBuf {
-    let rest = folders.iter().find_map(|folder| input.strip_prefix(folder).ok());
-    let is_below = |way: &&Path| way.components().all(|part| part != Component::ParentDir);
-    rest.and_then(Path::parent).filter(is_below).map_or_else(PathBuf::new, Path::to_path_buf)
+    let Some(folder) = folders.iter().find(|folder| input.starts_with(folder)) else { return PathBuf::new() };
+    let rest = |path: &Path| path.strip_prefix(folder).map_or_else(|_| PathBuf::new(), Path::to_path_buf);
+    let way = match split(input) {
+        Some((archive, name)) if archive.starts_with(folder) => {
+            let inside = name.parent().unwrap_or(Path::new(""));
+            // Of one that was named itself nothing is left but its own name.
+            rest(archive).with_file_name(archive.file_stem().unwrap_or_default()).join(inside)
+        }
+        _ => rest(input).parent().map(Path::to_path_buf).unwrap_or_default(),
+    };
+    let is_below = way.components().all(|part| part != Component::ParentDir);
+    if is_below { way } else { PathBuf::new() }
 }
 
-/// What is told of a folder or an archive that cannot be read, and how the command ends because of it.
-type Fault = (Diagnostic, Exit);
+/// What was found in a folder or an archive.
+#[derive(Default)]
+struct Found {
+    models: Vec<PathBuf>,
+    /// What is to be told, and how the command ends because of it.
+    told: Vec<(Severity, Diagnostic, Exit)>,
+}
 
-/// All models in a folder and in those in it, in the order of their names, and what cannot be read.
-fn models_in(folder: &Path) -> (Vec<PathBuf>, Vec<Fault>) {
-    let (mut models, mut faults, mut left) = (Vec::new(), Vec::new(), vec![folder.to_path_buf()]);
-    while let Some(folder) = left.pop() {
-        if let Err(error) = look_into(&folder, &mut models, &mut left, &mut faults) {
-            faults.push((Diagnostic::new("folder-unreadable", folder, "", error.to_string()), Exit::Failed));
+impl Found {
+    /// All models in a folder and in those in it, in the order of their names, and what cannot be read.
+    fn add_folder(&mut self, folder: &Path) {
+        let mut left = vec![folder.to_path_buf()];
+        while let Some(folder) = left.pop() {
+            if let Err(error) = self.look_into(&folder, &mut left) {
+                let fault = Diagnostic::new("folder-unreadable", folder, "", error.to_string());
+                self.told.push((Severity::Error, fault, Exit::Failed));
+            }
         }
+        self.models.sort_unstable();
     }
-    models.sort_unstable();
-    (models, faults)
-}
 
-/// The models in a folder itself and in the archives there, and the folders in it.
-fn look_into(
-    folder: &Path,
-    models: &mut Vec<PathBuf>,
-    folders: &mut Vec<PathBuf>,
-    faults: &mut Vec<Fault>,
-) -> io::Result<()> {
-    for entry in fs::read_dir(folder)? {
-        let entry = entry?;
-        if entry.file_name().as_encoded_bytes().starts_with(b".") {
-            continue;
+    /// The models in a folder itself and in the archives there, and the folders in it.
+    fn look_into(&mut self, folder: &Path, folders: &mut Vec<PathBuf>) -> io::Result<()> {
+        let (mut archives, mut names) = (Vec::new(), HashSet::new());
+        for entry in fs::read_dir(folder)? {
+            let entry = entry?;
+            if entry.file_name().as_encoded_bytes().starts_with(b".") {
+                continue;
+            }
+            let (path, kind) = (entry.path(), entry.file_type()?);
+            if kind.is_dir() {
+                names.insert(entry.file_name());
+                folders.push(path);
+            } else if is_called_a_model(&path) && path.is_file() {
+                names.extend(path.file_stem().map(OsStr::to_os_string));
+                self.models.push(path);
+            } else if is_archive(&path) {
+                archives.push(path);
+            }
         }
-        let (path, kind) = (entry.path(), entry.file_type()?);
-        if kind.is_dir() {
-            folders.push(path);
-        } else if is_called_a_model(&path) && path.is_file() {
-            models.push(path);
-        } else if is_archive(&path) {
-            match models_of(&path) {
-                Ok(found) => models.extend(found),
-                Err(error) => faults.push(unreadable(error, &path)),
+        archives.sort_unstable();
+        for archive in archives {
+            let unpacked = archive.file_stem().filter(|stem| names.contains(*stem));
+            match unpacked {
+                Some(stem) => {
+                    let text = format!("left out, as '{}' is beside it", stem.display());
+                    let note = Diagnostic::new("archive-unpacked", archive, "", text);
+                    self.told.push((Severity::Info, note.remedy("name the archive itself to have it"), Exit::Done));
+                }
+                None => self.add_archive(&archive),
+            }
+        }
+        Ok(())
+    }
+
+    /// The models of an archive: one alone under the name of that.
+    fn add_archive(&mut self, path: &Path) {
+        match opened(path).and_then(|archive| archive.ok_or(ArchiveFault::None.into())) {
+            Ok(archive) if archive.models(Path::new("")).len() == 1 => self.models.push(path.into()),
+            Ok(_) => _ = self.add_several(path),
+            Err(error) => {
+                let told = match ArchiveFault::of(&error) {
+                    Some(fault) => (Severity::Error, fault.diagnose(path), Exit::Input),
+                    None => {
+                        let fault = Diagnostic::new("file-unreadable", path, "", error.to_string());
+                        (Severity::Error, fault, Exit::Failed)
+                    }
+                };
+                self.told.push(told);
             }
         }
     }
-    Ok(())
-}
 
-/// What is told of an archive that cannot be looked into.
-fn unreadable(error: io::Error, path: &Path) -> Fault {
-    match archive::of_archive(&error) {
-        Some(fault) => (fault.diagnose(path), Exit::Input),
-        None => (Diagnostic::new("file-unreadable", path, "", error.to_string()), Exit::Failed),
+    /// The models of an archive with several, or of a folder in one; false of all else, of which is told where it is loaded what
+    /// is wrong with it.
+    fn add_several(&mut self, path: &Path) -> bool {
+        let path = &without_slash(path);
+        let whole = if is_archive(path) { opened(path).ok().flatten() } else { None };
+        let (archive, folder) = match (whole, in_archive(path)) {
+            (Some(archive), _) => (archive, Path::new("")),
+            (None, Ok(Some((archive, name)))) if !archive.has(name) => (archive, name),
+            _ => return false,
+        };
+        let models = archive.models(folder);
+        if models.is_empty() || models.len() == 1 && folder == Path::new("") {
+            return false;
+        }
+        for model in models {
+            let note = model.note(path).map(|note| (Severity::Info, note, Exit::Done));
+            self.told.extend(note);
+            self.models.push(path.join(model.name));
+        }
+        true
     }
 }
 
@@ -143,7 +199,7 @@ mod tests {
         }
         let mut told = Vec::new();
         let inputs = [at("all"), at("lone.toml"), "-".into(), at("none"), at("all/b"), at("gone.obj")];
-        let (found, ended) = unfold(&inputs, |fault| told.push((fault.code, fault.file.clone())));
+        let (found, ended) = unfold(&inputs, |_, fault| told.push((fault.code, fault.file.clone())));
         let expected = names.map(at).into_iter().chain([at("lone.toml"), "-".into(), at("gone.obj")]);
         assert_eq!(found, expected.collect::<Vec<_>>(), "each once");
         assert_eq!((told, ended), (vec![("folder-empty", at("none"))], Exit::Input));
@@ -157,6 +213,16 @@ mod tests {
         assert_eq!(below(".", "./b/x.glb"), Path::new("b"));
         assert_eq!(below("all", "other/b/x.glb"), Path::new(""));
         assert_eq!(below("all", "all/../x/y.glb"), Path::new(""), "named beside the folder");
+        // What lies in an archive, as far as is known of a file of that name.
+        let dir = tempfile::tempdir().unwrap();
+        fs::create_dir(dir.path().join("all")).unwrap();
+        fs::write(dir.path().join("all/pack.zip"), "").unwrap();
+        let below = |folder: &str, input: &str| way_below(&[dir.path().join(folder)], &dir.path().join(input));
+        assert_eq!(below("", "all/pack.zip"), Path::new("all"));
+        assert_eq!(below("", "all/pack.zip/b/x.glb"), Path::new("all/pack/b"));
+        assert_eq!(below("all/pack.zip", "all/pack.zip/b/x.glb"), Path::new("pack/b"));
+        assert_eq!(below("all/pack.zip/b", "all/pack.zip/b/c/x.glb"), Path::new("c"));
+        assert_eq!(below("all/pack.zip", "all/pack.zip"), Path::new(""));
     }
 
     #[cfg(unix)]
@@ -169,6 +235,6 @@ mod tests {
         std::os::unix::fs::symlink(at("all"), at("all/round")).unwrap();
         std::os::unix::fs::symlink(at("model.obj"), at("all/one.obj")).unwrap();
         std::os::unix::fs::symlink(at("gone.obj"), at("all/two.obj")).unwrap();
-        assert_eq!(unfold(&[at("all")], |fault| panic!("{fault}")), (vec![at("all/one.obj")], Exit::Done));
+        assert_eq!(unfold(&[at("all")], |_, fault| panic!("{fault}")), (vec![at("all/one.obj")], Exit::Done));
     }
 }

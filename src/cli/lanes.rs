@@ -13,7 +13,7 @@ use super::outputs::Target;
 use super::progress::Progress;
 use super::render::{self, SoFar};
 use crate::image::was_written_by_meshray;
-use crate::load::archive::{self, Archive};
+use crate::load::archive;
 use crate::load::is_called_a_model;
 use crate::render::Settings;
 use crate::threads;
@@ -100,12 +100,13 @@ impl Sizes {
         let mut length = |input: &PathBuf| {
             let kind = input.extension()?.to_str()?.to_ascii_lowercase();
             // Of what is unpacked it has its share; what is not there is soon said.
-            let share = |archive: Archive| archive.unpacked() / (archive.models().count() as u64).max(1);
-            let Ok(file) = input.metadata() else { return Some(archive::of_path(input).map_or(0, share)) };
+            let Ok(file) = input.metadata() else {
+                return Some(archive::in_archive(input).ok().flatten().map_or(0, |(archive, _)| archive.share()));
+            };
             let own = file.is_file().then_some(file.len())?;
             match kind.as_str() {
                 "glb" | "ply" | "stl" => Some(own),
-                "zip" => archive::of_path(input).map(share),
+                "zip" => archive::opened(input).ok().flatten().map(|archive| archive.share()),
                 "nff" => self.has_size.then_some(own),
                 "gltf" | "obj" => {
                     let folder = input.parent()?;

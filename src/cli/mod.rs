@@ -143,7 +143,7 @@ fn render_command(typed: &RenderArgs) -> Exit {
             Err((fault, exit)) => return messages.fail(&fault, exit),
         }
     }
-    let (models, unfolded) = folders::unfold(&args.inputs, |fault| messages.say(Severity::Error, fault));
+    let (models, unfolded) = folders::unfold(&args.inputs, |severity, what| messages.say(severity, what));
     if models.is_empty() && unfolded != Exit::Done {
         return unfolded;
     }

@@ -61,7 +61,7 @@ pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Di
     let fault = |code, text: &str, remedy: &str| Err(Diagnostic::new(code, path, "", text).remedy(remedy));
     let goal = destination(path);
     let folder = goal.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if folder.exists() && !folder.is_dir() {
+    if folder.exists() && !folder.is_dir() || archive::split(folder).is_some() {
         return fault("output-in-file", "what should be its folder is a file", &format!("name another with {flag}"));
     }
     if !folder.is_dir() {

@@ -41,7 +41,6 @@ use paths::FileRead;
 
 use crate::scene::{Scene, UpAxis};
 use crate::stopwatch::{Spent, Stopwatch};
-use std::io::Seek;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -208,12 +207,14 @@ pub struct Source {
     pub bytes: Vec<u8>,
     /// The archive that it lies in, if it does.
     pub within: Option<Arc<Archive>>,
+    /// How it was chosen from that, where that has to be told.
+    pub note: Option<Diagnostic>,
 }
 
 impl Source {
     /// One that lies in no archive.
     pub fn new(path: PathBuf, bytes: Vec<u8>) -> Self {
-        Self { path, bytes, within: None }
+        Self { path, bytes, within: None, note: None }
     }
 
     /// Whether it came from standard input.
@@ -320,6 +321,7 @@ fn load_within(source: &Source, options: &LoadOptions, budget: &mut Budget) -> R
         detect::Format::SceneFile => scene_file::load(source, options, budget),
         detect::Format::Stl(encoding) => stl::load(source, encoding, options, budget),
     }?;
+    loaded.warnings.extend(source.note.clone());
     if let Some(angle) = options.smooth {
         smooth::smooth(&mut loaded.scene, angle, budget).map_err(|over| too_large("smooth normals are", over))?;
         tangents::generate_left(&mut loaded.scene);
@@ -337,31 +339,36 @@ fn in_memory(name: &Path, bytes: Vec<u8>, limits: &Limits) -> Result<Source, Loa
         return Ok(Source::new(name.into(), bytes));
     }
     let archive = Archive::from_bytes(name, bytes).map_err(|error| archive::unreadable(error, name))?;
-    archive::only_model(archive, limits)
+    archive::only_model(Arc::new(archive), limits)
 }
 
-/// Reads the model file itself, which may lie anywhere.
+/// Reads the model file itself, which may lie anywhere, or the only model of an archive.
 fn read_source(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
+    // What is no plain file, such as a pipe, is opened but once.
+    let archive = if path.is_file() { archive::opened(path) } else { Ok(None) };
+    if let Some(archive) = archive.map_err(|error| archive::unreadable(error, path))? {
+        return archive::only_model(archive, limits);
+    }
+    match read_file(path, limits)? {
+        Source { path, bytes, within: None, .. } => in_memory(&path, bytes, limits),
+        source => Ok(source),
+    }
+}
+
+/// Reads a file that may lie anywhere, in an archive, too, whatever it is.
+fn read_file(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
     let fault = |error| archive::unreadable(error, path);
     let too_large = |bytes| LoadError::from(too_large(path, bytes, limits));
-    let mut file = match std::fs::File::open(path) {
+    let file = match std::fs::File::open(path) {
         Ok(file) => file,
         Err(error) => {
             let (archive, name) = archive::in_archive(path).map_err(fault)?.ok_or_else(|| fault(error))?;
-            return archive::named_model(archive, &name, limits);
+            return archive::named_model(archive, name, limits);
         }
     };
     let meta = file.metadata().map_err(fault)?;
     if meta.is_dir() {
         return Err(Diagnostic::new("file-not-plain", path, "", "is a folder").remedy("name a file in it").into());
-    }
-    // What is no plain file, such as a pipe, is read but once; an archive may be larger than one.
-    if meta.is_file() {
-        if archive::begins_as_archive(path, &mut file).map_err(fault)? {
-            let archive = Archive::of_file(path, file).map_err(fault)?;
-            return archive::only_model(archive, limits);
-        }
-        file.rewind().map_err(fault)?;
     }
     if meta.len() > limits.file {
         return Err(too_large(meta.len()));
@@ -370,7 +377,7 @@ fn read_source(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
     if bytes.len() as u64 > limits.file {
         return Err(too_large(bytes.len() as u64));
     }
-    in_memory(path, bytes, limits)
+    Ok(Source::new(path.into(), bytes))
 }
 
 /// What is told of a model file that is larger than is allowed.

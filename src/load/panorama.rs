@@ -43,7 +43,7 @@ pub(super) const PER_PIXEL: u64 = 48;
 /// [`LoadError::Read`] when the file cannot be read, [`LoadError::Input`] when it is no such picture or larger than
 /// `limits` allow.
 pub fn load(path: &Path, limits: &Limits) -> Result<LoadedPanorama, LoadError> {
-    decode(&super::read_source(path, limits)?, limits)
+    decode(&super::read_file(path, limits)?, limits)
 }
 
 /// The same from memory.

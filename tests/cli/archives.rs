@@ -49,7 +49,7 @@ fn the_model_of_an_archive_is_drawn_as_it_is_unpacked_and_under_the_name_of_the_
 fn an_archive_with_several_models_is_a_folder_of_them() {
     let folder = downloads();
     folder.render(&["all", "-o", "thumbs/", "--update"]).ends(0).says(&["3 pictures of 3 inputs, 0 up to date"]);
-    for name in ["thumbs/cube.png", "thumbs/pack.zip/a/one.png", "thumbs/pack.zip/b/two.png"] {
+    for name in ["thumbs/cube.png", "thumbs/pack/a/one.png", "thumbs/pack/b/two.png"] {
         assert!(folder.has(name), "{name}");
     }
     folder.render(&["all", "-o", "thumbs/", "--update"]).ends(0).says(&["0 pictures of 3 inputs, 3 up to date"]);
@@ -65,8 +65,50 @@ fn an_archive_with_several_models_is_a_folder_of_them() {
         .render(&["all/pack.zip/b/two.obj", "all/pack.zip", "-o", "{sub}/{stem}.jpg"])
         .ends(0)
         .says(&["2 pictures of 2 inputs"]);
-    assert!(folder.has("a/one.jpg") && folder.has("b/two.jpg"));
+    assert!(folder.has("pack/a/one.jpg") && folder.has("pack/b/two.jpg"));
+    // With a slash behind it, and a folder in it.
+    folder.render(&["all/pack.zip/"]).ends(0).says(&["2 pictures of 2 inputs"]);
+    assert!(folder.has("pack/a/one.png") && folder.has("pack/b/two.png"));
+    folder.render(&["all/pack.zip/b", "-o", "{dir}.png"]).ends(1).says(&["what should be its folder is a file"]);
+    folder.render(&["all/pack.zip/b"]).ends(0);
+    assert!(folder.has("two.png"));
     folder.run(&["inspect", "all/pack.zip"]).ends(3).says(&["2 models", "'a/one.obj'", "name one"]);
+}
+
+#[test]
+fn archives_of_one_layout_do_not_meet_in_their_pictures() {
+    let pack = || zip(&[("models/rock.obj", CUBE.as_bytes()), ("models/tree.obj", CUBE.as_bytes())]);
+    let folder = Folder::new().file("a.zip", pack()).file("b.zip", pack());
+    folder.render(&["a.zip", "b.zip", "-o", "thumbs/"]).ends(0).says(&["4 pictures of 4 inputs"]);
+    assert!(folder.has("thumbs/a/models/rock.png") && folder.has("thumbs/b/models/rock.png"));
+    // The pictures know where they come from, also where that lies beside them by now.
+    std::fs::create_dir(folder.path("moved")).unwrap();
+    std::fs::rename(folder.path("b.zip"), folder.path("moved/b.zip")).unwrap();
+    std::fs::rename(folder.path("thumbs/b/models/rock.png"), folder.path("moved/rock.png")).unwrap();
+    folder.run(&["render", "--again", "moved/rock.png", "-o", "again.png"]).ends(0);
+    assert!(folder.has("again.png"));
+}
+
+#[test]
+fn what_an_archive_has_in_several_formats_is_drawn_once_and_one_that_is_unpacked_beside_it_not_at_all() {
+    let both = zip(&[
+        ("chair.obj", CUBE.as_bytes()),
+        (
+            "chair.stl",
+            b"solid
+endsolid
+",
+        ),
+        ("chair.fbx", b""),
+    ]);
+    let folder = Folder::new().file("all/chair.zip", &both).file("all/table.zip", &both).file("all/table.obj", CUBE);
+    folder.render(&["all", "-o", "thumbs/"]).ends(0).says(&[
+        "2 pictures of 2 inputs",
+        "table.zip: left out, as 'table' is beside it",
+        "'chair.obj' is drawn, and not 'chair.stl' beside it",
+    ]);
+    folder.render(&["all/table.zip", "--strict"]).ends(3).says(&["chair.stl", "--strict"]);
+    folder.render(&["all/table.zip/chair.obj", "--strict"]).ends(0);
 }
 
 #[test]
@@ -81,6 +123,8 @@ fn an_archive_that_is_damaged_is_told_and_keeps_nobody_up() {
     ]);
     folder.render(&["all/pictures.zip"]).ends(3).says(&["no model is in this archive", "'a.png'"]);
     folder.render(&["all/cut.zip"]).ends(3).says(&["damaged"]);
+    let folder = downloads().file("all/page.zip", "<html>not found</html>");
+    folder.render(&["all", "-o", "thumbs/"]).ends(3).says(&["page.zip: this is no zip archive"]);
 }
 
 #[test]
@@ -93,4 +137,24 @@ fn no_output_replaces_an_archive_that_is_read() {
         .ends(1)
         .says(&["pack.json", "would replace a file that is read"]);
     assert!(folder.read("pack.json") == before);
+}
+
+/// What lies behind a link is what is read.
+#[cfg(unix)]
+#[test]
+fn no_output_replaces_what_a_scene_file_names_by_a_link() {
+    let folder = downloads().file("real/cube.json", CUBE);
+    std::fs::rename(folder.path("all/cube.zip"), folder.path("real/alone.json")).unwrap();
+    std::fs::rename(folder.path("all/pack.zip"), folder.path("real/pack.json")).unwrap();
+    for (file, below) in [("cube.json", ""), ("alone.json", ""), ("pack.json", "/a/one.obj")] {
+        let (link, file) = (format!("link-{file}"), format!("real/{file}"));
+        std::os::unix::fs::symlink(&file, folder.path(&link)).unwrap();
+        std::fs::write(folder.path("scene.toml"), format!("[[models]]\nfile = '{link}{below}'\n")).unwrap();
+        let before = folder.read(&file);
+        folder
+            .run(&["bench", "scene.toml", "--report", &file])
+            .ends(1)
+            .says(&[&file, "would replace a file that is read"]);
+        assert!(folder.read(&file) == before, "{file}");
+    }
 }

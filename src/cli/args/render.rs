@@ -21,7 +21,8 @@ pub(in crate::cli) struct RenderArgs {
     /// standard input
     ///
     /// An archive is not unpacked. Its only model is drawn under the name of the archive; one with several models is a folder
-    /// of them, and one of these is named as in a folder: ships.zip/tug/tug.gltf.
+    /// of them, and one of these is named as in a folder: ships.zip/tug/tug.gltf. In a folder one is left out that was
+    /// unpacked there, beside a folder or a model of its name.
     #[arg(value_name = "INPUT", required_unless_present = "again")]
     pub inputs: Vec<PathBuf>,
     /// The folders among them.
@@ -32,7 +33,8 @@ pub(in crate::cli) struct RenderArgs {
     /// {ext} {view} {frame:04}
     ///
     /// Without it the picture goes to STEM.png in the current folder. Pictures of models in the folders of a folder that was
-    /// named go to folders like these: {sub} is the way from the folder that was named to the model's own. A folder given here
+    /// named go to folders like these: {sub} is the way from the folder that was named to the model's own, on which an
+    /// archive has no extension. A folder given here
     /// is made, and so are those of a template with fields other than {dir}, where what the first lies in is there.
     /// Names that are made up, in a folder given here and of heat maps too, and those of a template beside any of the models,
     /// replace only a picture that meshray wrote; a name given here replaces whatever is there.

@@ -3,7 +3,7 @@
 #![cfg(test)]
 
 use super::*;
-use crate::load::{LoadOptions, Loaded, load, load_bytes};
+use crate::load::{LoadError, LoadOptions, Loaded, load, load_bytes};
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
 use rawzip::ZipArchiveWriter;
@@ -143,7 +143,7 @@ fn scene_files_show_models_in_archives() {
 #[test]
 fn archives_without_models_say_what_they_hold() {
     let (code, text) = fault(of_bytes(&[]));
-    assert!(code == "archive-empty" && text.contains("this archive is empty"), "{code}: {text}");
+    assert!(code == "archive-empty" && text.contains("no file is in this archive"), "{code}: {text}");
     let (code, text) = fault(of_bytes(&[("textures/a.png", b"1"), ("robot.fbx", b"2")]));
     assert_eq!(code, "archive-empty");
     assert!(text.contains("it has 'robot.fbx', 'textures/a.png';"), "{text}");
@@ -151,24 +151,27 @@ fn archives_without_models_say_what_they_hold() {
 
 #[test]
 fn nothing_leads_out_of_an_archive() {
-    let names = ["../../etc/a.obj", "/rooted/b.obj", "x/../c.obj", "x/../../d.obj", "./e.obj", "C:\\f.obj"];
-    let bytes = zip_verbatim(&names);
+    let names =
+        ["../../etc/a.obj", "/rooted/b.obj", "x/../c.obj", "x/../../d.obj", "./e.obj", "C:\\f.obj", "folder.obj\\"];
+    let bytes = zip_verbatim(&names.map(|name| (name.as_bytes(), &b""[..])));
     let archive = Archive::from_bytes(Path::new("a.zip"), bytes).unwrap();
-    let held: Vec<&str> = archive.models().collect();
+    let held: Vec<&str> = archive.models(Path::new("")).iter().map(|model| model.name).collect();
     assert_eq!(held, ["C:/f.obj", "c.obj", "e.obj", "rooted/b.obj"]);
     assert!(!archive.has(Path::new("../a.zip/c.obj")) && archive.names_in(Path::new("..")).next().is_none());
     assert_eq!(archive.names_in(Path::new("rooted")).collect::<Vec<_>>(), ["b.obj"]);
     assert!(archive.has_folder(Path::new("")) && !archive.has_folder(Path::new("root")));
 }
 
-/// An archive of empty files whose names are as they are given.
-fn zip_verbatim(names: &[&str]) -> Vec<u8> {
+/// An archive of files, stored as they are, under names that are written as they are given.
+fn zip_verbatim(files: &[(&[u8], &[u8])]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut archive = ZipArchiveWriter::new(&mut bytes);
-    for name in names {
-        let path = rawzip::path::EntryPath::verbatim(name.as_bytes());
-        let (entry, config) = archive.new_file(path).compression_method(CompressionMethod::STORE).start().unwrap();
-        let (_, descriptor) = config.wrap(Vec::new()).finish().unwrap();
+    for (name, content) in files {
+        let path = rawzip::path::EntryPath::verbatim(*name);
+        let (mut entry, config) = archive.new_file(path).compression_method(CompressionMethod::STORE).start().unwrap();
+        let mut writer = config.wrap(&mut entry);
+        writer.write_all(content).unwrap();
+        let (_, descriptor) = writer.finish().unwrap();
         entry.finish(descriptor).unwrap();
     }
     archive.finish().unwrap();
@@ -185,19 +188,22 @@ fn a_spoiled_file_is_told_and_none_is_unpacked_to_more_than_it_says() {
     assert_eq!(read(whole.clone(), "long.txt").unwrap(), long);
     let archive = Archive::from_bytes(Path::new("a.zip"), whole.clone()).unwrap();
     assert_eq!(archive.read(Path::new("long.txt"), 99_999).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
-    assert_eq!(archive.unpacked(), 100_015);
+    assert_eq!(archive.share(), 100_015);
     // A letter of what is stored.
     let at = whole.windows(6).position(|w| w == b"stored").unwrap();
     let mut spoiled = whole.clone();
     spoiled[at] = b'S';
     let error = read(spoiled, "a.bin").unwrap_err();
-    assert!(matches!(of_archive(&error), Some(ArchiveFault::Spoiled(why)) if why.contains("checksum")), "{error}");
+    assert!(
+        matches!(ArchiveFault::of(&error), Some(ArchiveFault::Spoiled(why)) if why.contains("checksum")),
+        "{error}"
+    );
     // What the directory says of a length: 100 000 -> 5.
     let at = whole.windows(4).rposition(|w| w == 100_000_u32.to_le_bytes()).unwrap();
     let mut lying = whole.clone();
     lying[at..at + 4].copy_from_slice(&5_u32.to_le_bytes());
     let error = read(lying, "long.txt").unwrap_err();
-    assert!(matches!(of_archive(&error), Some(ArchiveFault::Spoiled(_))), "{error}");
+    assert!(matches!(ArchiveFault::of(&error), Some(ArchiveFault::Spoiled(_))), "{error}");
     // The flags and the method of the first entry of the directory.
     let at = whole.windows(4).position(|w| w == b"PK\x01\x02").unwrap();
     for (offset, value, expected) in [
@@ -207,7 +213,7 @@ fn a_spoiled_file_is_told_and_none_is_unpacked_to_more_than_it_says() {
     ] {
         let mut other = whole.clone();
         other[at + offset] = value;
-        assert_eq!(of_archive(&read(other, "a.bin").unwrap_err()).unwrap().to_string(), expected);
+        assert_eq!(ArchiveFault::of(&read(other, "a.bin").unwrap_err()).unwrap().to_string(), expected);
     }
 }
 
@@ -225,4 +231,28 @@ fn a_cut_or_garbled_archive_never_panics() {
             drop(load_bytes(Path::new("a.zip"), garbled, &LoadOptions::default()));
         }
     }
+}
+
+#[test]
+fn names_in_the_letters_of_old_programs_find_each_other() {
+    let obj = OBJ.replace("paint.mtl", "Grün.mtl");
+    let files: [(&[u8], &[u8]); 3] =
+        [(b"H\x84user/a.obj", obj.as_bytes()), (b"H\x84user/Gr\x81n.mtl", MTL), (b"H\x84user/Gr\x82n.mtl", b"")];
+    let loaded = load_bytes(Path::new("a.zip"), zip_verbatim(&files), &LoadOptions::default()).unwrap();
+    assert_eq!(names(&loaded), ["a.zip/Häuser/a.obj", "a.zip/Häuser/Grün.mtl"]);
+}
+
+#[test]
+fn of_one_model_in_several_formats_the_one_with_materials_is_drawn_and_the_others_are_told() {
+    let files =
+        [("a/house.stl", &b""[..]), ("a/House.glb", b""), ("a/house.obj", OBJ.as_bytes()), ("a/house.ply", b"")];
+    let archive = Archive::from_bytes(Path::new("a.zip"), zip(&files)).unwrap();
+    let offered = archive.models(Path::new(""));
+    assert_eq!(offered.iter().map(|model| model.name).collect::<Vec<_>>(), ["a/House.glb", "a/house.obj"]);
+    assert_eq!(offered[1].others, ["a/house.ply", "a/house.stl"]);
+    assert_eq!(archive.models(Path::new("a"))[1].name, "house.obj", "from that folder");
+    let loaded = of_bytes(&[files[0], files[2], files[3]]).unwrap();
+    assert_eq!(names(&loaded).len(), 1);
+    let told: Vec<_> = loaded.warnings.iter().map(|warning| warning.code).collect();
+    assert!(told.contains(&"archive-formats"), "{told:?}");
 }

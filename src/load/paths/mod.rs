@@ -8,7 +8,7 @@
 mod tests;
 mod volume;
 
-use super::archive::{self, ArchiveFault};
+use super::archive::{ArchiveFault, source};
 use super::limits::{Budget, OverBudget};
 use super::{Diagnostic, Limits, LoadError, LoadOptions, Source};
 use crate::stopwatch::{Spent, Stopwatch};
@@ -282,7 +282,7 @@ impl Resolver {
             match why {
                 Unread::NotAFile => FileFault::NotAFile(name),
                 Unread::TooLarge(bytes) => FileFault::TooLarge { name, bytes, limit, remedy },
-                Unread::Io(source) => match archive::of_archive(&source) {
+                Unread::Io(source) => match ArchiveFault::of(&source) {
                     Some(why) => FileFault::Packed { name, fault: why.to_string(), remedy: why.remedy() },
                     None => FileFault::Io { name, source },
                 },
@@ -310,27 +310,21 @@ impl Resolver {
         Ok(budget.take((bytes.len() as u64).saturating_sub(said), 1).map(|()| bytes))
     }
 
-    /// Reads a model that [`Self::locate_model`] has found.
+    /// Reads a model that [`Self::locate`] has found.
     pub(super) fn read_model(&self, canonical: &Path) -> Result<Source, LoadError> {
         match &self.volume {
             Volume::Disk => super::read_source(canonical, &self.limits),
             Volume::Archive(archive) => {
                 let name = canonical.strip_prefix(archive.path()).unwrap_or(canonical);
-                archive::source(archive.clone(), name, &self.limits)
+                source(archive.clone(), name, &self.limits)
             }
         }
     }
 
-    /// The same as [`Self::locate`] of a model that a scene file names, which may lie in an archive below the root.
-    pub(super) fn locate_model(&self, name: &Path) -> Result<PathBuf, FileFault> {
-        let located = self.locate(name);
-        let Err(FileFault::Io { .. } | FileFault::Missing(_)) = located else { return located };
-        let wanted = self.base.join(name);
-        match archive::split(&wanted) {
-            // Whether the archive has it is told when it is read.
-            Some((above, rest)) => self.locate(above).map(|above| above.join(rest)),
-            None => located,
-        }
+    /// Whether what is named so lies in the folder of a file that [`Self::locate`] has found.
+    pub(super) fn lies_beside(&self, named: &Path, canonical: &Path) -> bool {
+        let folder = named.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        self.volume.canonical(folder).is_ok_and(|folder| canonical.parent() == Some(&*folder))
     }
 
     /// A file as it is named, from the folder of the model as that was.
@@ -368,7 +362,7 @@ impl Resolver {
             },
             Ok(path) => Err(outside(&path)),
             // Whether a file outside the root exists is nobody's business.
-            Err(_) if !lexical(&wanted).starts_with(&self.root) => Err(outside(&lexical(&wanted))),
+            Err(_) if self.volume.leads_out(&wanted, &self.root) => Err(outside(&lexical(&wanted))),
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
                 self.gaps.set(true);
                 Err(FileFault::Missing(shown))

@@ -1,10 +1,10 @@
 //! Where the files of a model lie: on disk, or in the archive that it is read from.
 
-use super::super::archive::Archive;
-use super::super::whole;
 use super::lexical;
+use crate::load::archive::{Archive, in_archive, split};
+use crate::load::whole;
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -13,6 +13,7 @@ const LISTED: usize = 10_000;
 
 #[derive(Clone, Debug)]
 pub(super) enum Volume {
+    /// With what lies in archives there, if their paths are named.
     Disk,
     Archive(Arc<Archive>),
 }
@@ -36,75 +37,97 @@ impl Volume {
     /// The one path of a file or folder that is there; an archive knows no links.
     pub(super) fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
         match self {
-            Self::Disk => path.canonicalize(),
+            Self::Disk => match path.canonicalize() {
+                Err(error) if may_lead_into_a_file(&error) => in_file(path)?.ok_or(error),
+                found => found,
+            },
             Self::Archive(archive) => {
-                let clean = lexical(path);
-                let is_there =
-                    clean.strip_prefix(archive.path()).is_ok_and(|name| archive.has(name) || archive.has_folder(name));
-                if is_there { Ok(clean) } else { Err(io::ErrorKind::NotFound.into()) }
+                let name = archive.inside(path).ok_or(ErrorKind::NotFound)?;
+                let is_there = archive.has(Path::new(&name)) || archive.has_folder(Path::new(&name));
+                if is_there { Ok(archive.path_of(&name)) } else { Err(ErrorKind::NotFound.into()) }
             }
+        }
+    }
+
+    /// Whether a path leads out of the root, whatever is there.
+    pub(super) fn leads_out(&self, path: &Path, root: &Path) -> bool {
+        match self {
+            Self::Disk => !lexical(path).starts_with(root),
+            Self::Archive(archive) => archive.inside(path).is_none(),
         }
     }
 
     /// Whether something that is there is a plain file.
     pub(super) fn is_file(&self, canonical: &Path) -> io::Result<bool> {
-        match self {
-            Self::Disk => fs::metadata(canonical).map(|meta| meta.is_file()),
-            Self::Archive(archive) => Ok(archive.has(within(archive, canonical))),
+        match self.within(canonical)? {
+            None => fs::metadata(canonical).map(|meta| meta.is_file()),
+            Some((archive, name)) => Ok(archive.has(name)),
         }
     }
 
     /// Bytes of a file; 0 where nobody says.
     pub(super) fn length(&self, canonical: &Path) -> u64 {
-        match self {
-            Self::Disk => fs::metadata(canonical).map_or(0, |meta| meta.len()),
-            Self::Archive(archive) => archive.length(within(archive, canonical)).unwrap_or(0),
+        match self.within(canonical) {
+            Ok(Some((archive, name))) => archive.length(name).unwrap_or(0),
+            _ => fs::metadata(canonical).map_or(0, |meta| meta.len()),
         }
     }
 
     /// The names of what lies in a folder.
     pub(super) fn names_in(&self, canonical: &Path) -> Vec<String> {
-        match self {
-            Self::Disk => {
-                let entries = fs::read_dir(canonical).into_iter().flatten().take(LISTED).flatten();
-                entries.filter_map(|entry| entry.file_name().into_string().ok()).collect()
-            }
-            Self::Archive(archive) => {
-                let mut names: Vec<String> =
-                    archive.names_in(within(archive, canonical)).take(LISTED).map(str::to_owned).collect();
-                names.dedup();
-                names
-            }
+        if let Ok(Some((archive, name))) = self.within(canonical) {
+            return archive.names_in(name).take(LISTED).map(str::to_owned).collect();
         }
+        let entries = fs::read_dir(canonical).into_iter().flatten().take(LISTED).flatten();
+        entries.filter_map(|entry| entry.file_name().into_string().ok()).collect()
     }
 
     /// Reads a plain file of at most so many bytes.
     pub(super) fn read(&self, canonical: &Path, most: u64) -> Result<Vec<u8>, Unread> {
+        if let Some((archive, name)) = self.within(canonical)? {
+            return archive.read(name, most).map_err(|error| match error.kind() {
+                ErrorKind::FileTooLarge => Unread::TooLarge(archive.length(name).unwrap_or(0)),
+                _ => Unread::Io(error),
+            });
+        }
+        let file = File::open(canonical)?;
+        let meta = file.metadata()?;
+        if !meta.is_file() {
+            return Err(Unread::NotAFile);
+        }
+        if meta.len() > most {
+            return Err(Unread::TooLarge(meta.len()));
+        }
+        // What other threads would do meanwhile is not in this one's time.
+        let bytes = whole::read_in_turn(file, meta.len(), most)?;
+        if bytes.len() as u64 > most { Err(Unread::TooLarge(bytes.len() as u64)) } else { Ok(bytes) }
+    }
+
+    /// The archive that something lies in, and its name there; `None` if it lies on disk.
+    fn within<'p>(&self, canonical: &'p Path) -> io::Result<Option<(Arc<Archive>, &'p Path)>> {
         match self {
-            Self::Disk => {
-                let file = File::open(canonical)?;
-                let meta = file.metadata()?;
-                if !meta.is_file() {
-                    return Err(Unread::NotAFile);
-                }
-                if meta.len() > most {
-                    return Err(Unread::TooLarge(meta.len()));
-                }
-                // What other threads would do meanwhile is not in this one's time.
-                let bytes = whole::read_in_turn(file, meta.len(), most)?;
-                if bytes.len() as u64 > most { Err(Unread::TooLarge(bytes.len() as u64)) } else { Ok(bytes) }
+            Self::Disk => in_archive(canonical),
+            Self::Archive(archive) => {
+                let name = canonical.strip_prefix(archive.path()).unwrap_or(canonical);
+                Ok(Some((archive.clone(), name)))
             }
-            Self::Archive(archive) => match archive.read(within(archive, canonical), most) {
-                Err(error) if error.kind() == io::ErrorKind::FileTooLarge => {
-                    Err(Unread::TooLarge(self.length(canonical)))
-                }
-                read => Ok(read?),
-            },
         }
     }
 }
 
-/// The name in an archive of what has this path.
-fn within<'p>(archive: &Archive, path: &'p Path) -> &'p Path {
-    path.strip_prefix(archive.path()).unwrap_or(path)
+/// Whether that nothing is found may mean that a path leads through a file.
+fn may_lead_into_a_file(error: &io::Error) -> bool {
+    error.kind() == ErrorKind::NotADirectory || cfg!(windows) && error.kind() == ErrorKind::NotFound
+}
+
+/// The one path of what lies in an archive on disk; `None` where a path leads into none.
+fn in_file(path: &Path) -> io::Result<Option<PathBuf>> {
+    let Some((above, rest)) = split(path) else { return Ok(None) };
+    let whole = above.canonicalize()?.join(rest);
+    let Some((archive, name)) = in_archive(&whole)? else { return Ok(None) };
+    if archive.has(name) {
+        Ok(archive.inside(&whole).map(|name| archive.path_of(&name)))
+    } else {
+        Err(ErrorKind::NotFound.into())
+    }
 }

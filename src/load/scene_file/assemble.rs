@@ -11,7 +11,7 @@ use crate::scene::merge::Stored;
 use crate::scene::{Bitmap, Panorama, Scene, UpAxis};
 use crate::stopwatch::Stopwatch;
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Reads the models and puts everything together.
 pub(super) fn assemble(
@@ -50,15 +50,12 @@ fn check_files(
     resolver: &Resolver,
 ) -> Result<(), LoadError> {
     let of_models = models.iter().map(|model| (&model.file, model.at));
-    let of_panorama = panorama.map(|picture| (&picture.file, picture.at));
-    let look_for = |file: &str, at, found: Result<_, FileFault>| {
+    for (file, at) in of_models.chain(panorama.map(|picture| (&picture.file, picture.at))) {
         let elsewhere = file.contains("://").then(|| FileFault::Scheme(shorten(file)));
-        if let Some(fault) = elsewhere.or_else(|| found.err()) {
+        if let Some(fault) = elsewhere.or_else(|| resolver.locate(Path::new(file)).err()) {
             faults.note_file(at, &fault);
         }
-    };
-    of_models.for_each(|(file, at)| look_for(file, at, resolver.locate_model(Path::new(file))));
-    of_panorama.into_iter().for_each(|(file, at)| look_for(file, at, resolver.locate(Path::new(file))));
+    }
     faults.check()
 }
 
@@ -161,7 +158,7 @@ impl Assembly<'_> {
         let Self { faults, source, options, resolver, .. } = self;
         let place = || faults.place(model.at);
         let path = resolver
-            .locate_model(Path::new(&model.file))
+            .locate(Path::new(&model.file))
             .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &place())))?;
         let before = options.animations_before.unwrap_or(0) + self.facts.animations.len();
         let options = LoadOptions {
@@ -182,14 +179,22 @@ impl Assembly<'_> {
         loaded.facts.reading += reading;
         // It was read where it really lies; a copy of the whole would still name that.
         let named = resolver.as_named(Path::new(&model.file));
-        for file in &mut loaded.facts.files {
-            let below = path.parent().and_then(|folder| file.path.strip_prefix(folder).ok());
-            if let (Some(below), Some(folder)) = (below, named.parent()) {
-                file.path = folder.join(below);
-            }
-        }
+        // What lies beside a model that is named by a link does not lie beside the link.
+        let beside = named.parent().filter(|_| resolver.lies_beside(&named, &path));
+        loaded.facts.files.iter_mut().for_each(|file| file.path = as_named(&file.path, &path, (&named, beside)));
         Ok(loaded)
     }
+}
+
+/// The path of a file that was read for a model with this path, which was `named` so: from there, if it is the model or in it,
+/// which is an archive then, or from the folder `beside`, if it lies in that of the model.
+fn as_named(file: &Path, model: &Path, (named, beside): (&Path, Option<&Path>)) -> PathBuf {
+    let way = file.strip_prefix(model);
+    if let Ok(way) = way {
+        return if way.as_os_str().is_empty() { named.into() } else { named.join(way) };
+    }
+    let way = model.parent().and_then(|folder| file.strip_prefix(folder).ok());
+    way.zip(beside).map_or_else(|| file.into(), |(way, beside)| beside.join(way))
 }
 
 /// Adds what was found out about a model that is shown once more, stretched so much.

@@ -242,9 +242,16 @@ fn layers_tell_how_certain_each_pixel_is_and_what_it_took() {
     assert!(rendered.sampled.errors.iter().any(|&e| e > 0.0));
 }
 
+/// The same without rays that are spread by chance, before which nobody looks what they meet.
+fn sharp() -> Stage {
+    let mut s = soft();
+    (s.settings.lens, s.settings.gloss_rays) = (None, None);
+    s
+}
+
 #[test]
 fn pixels_around_tiles_are_looked_at_only_where_that_can_decide_something() {
-    let mut s = soft();
+    let mut s = sharp();
     (s.settings.width, s.settings.height) = (40, 12);
     let mut rays = |min_samples| {
         s.settings.sampling = Sampling::Stochastic(Stochastic { min_samples, ..stochastic(0.1, 16) });
@@ -259,11 +266,17 @@ fn pixels_around_tiles_are_looked_at_only_where_that_can_decide_something() {
     let (all, kept) = rays(1);
     // Were the first ones traced twice, too, it would be 48 more.
     assert!((1..=2 * 12 * 3).contains(&(all - kept)), "{}", all - kept);
+    // What is known before is not traced for any tile.
+    let mut s = soft();
+    (s.settings.width, s.settings.height) = (40, 12);
+    s.settings.sampling = Sampling::Stochastic(stochastic(0.1, 16));
+    let sampled = s.render().sampled;
+    assert_eq!((sampled.rays - sampled.looked, sampled.samples()), (40 * 12 * 16, 16.0));
 }
 
 #[test]
 fn a_tile_by_itself_is_what_it_is_among_others() {
-    let mut s = soft();
+    let mut s = sharp();
     (s.settings.width, s.settings.height, s.settings.layers) = (70, 40, true);
     for (min_samples, max_samples) in [(1, 64), (1, 2), (1, 1), (4, 16)] {
         s.settings.sampling = Sampling::Stochastic(Stochastic { min_samples, ..stochastic(0.08, max_samples) });

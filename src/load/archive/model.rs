@@ -1,0 +1,145 @@
+//! Which of the files in an archive is the model.
+
+use super::{Archive, ArchiveFault};
+use crate::load::detect::is_called_a_model;
+use crate::load::limits::Limits;
+use crate::load::paths::{FileFault, shorten, shown};
+use crate::load::suggest::nearest;
+use crate::load::{Diagnostic, LoadError, Source, too_large};
+use std::collections::BTreeMap;
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Kinds of files of one model, the best first: with materials and all that belongs to it in one file, with materials, without.
+const KINDS: [&str; 7] = ["glb", "gltf", "vrm", "obj", "ply", "stl", "nff"];
+
+/// A model in an archive.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Offered<'a> {
+    /// Its file, with `/` between folders.
+    pub name: &'a str,
+    /// Files beside it with the same name but for the extension: the same in other formats.
+    pub others: Vec<&'a str>,
+}
+
+impl Offered<'_> {
+    /// That these are not drawn, as a message about the archive.
+    pub fn note(&self, archive: &Path) -> Option<Diagnostic> {
+        let first = self.others.first()?;
+        let more = if self.others.len() > 1 { format!(" and {} more", self.others.len() - 1) } else { String::new() };
+        let text = format!("'{}' is drawn, and not '{}'{more} beside it", shorten(self.name), shorten(first));
+        let remedy = format!("name another format by its path: '{}'", archive.join(first).display());
+        Some(Diagnostic::new("archive-formats", archive, "", text).remedy(remedy))
+    }
+}
+
+/// Whether a file has the name of a zip archive.
+pub fn is_called_an_archive(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zip"))
+}
+
+impl Archive {
+    /// The models in a folder of it and in those in that, in order, each in one format; what is hidden is none, nor what a Mac has
+    /// put beside each file.
+    pub fn models(&self, folder: &Path) -> Vec<Offered<'_>> {
+        let files = self.below(folder).filter(|name| is_shown(name) && is_called_a_model(Path::new(name)));
+        let mut by_stem: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        files.for_each(|name| {
+            by_stem.entry(name.rsplit_once('.').map_or(name, |(stem, _)| stem)).or_default().push(name)
+        });
+        let offered = by_stem.into_values().map(|mut files| {
+            files.sort_by_key(|name| {
+                let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
+                KINDS.iter().position(|kind| extension.eq_ignore_ascii_case(kind))
+            });
+            Offered { name: files.remove(0), others: files }
+        });
+        offered.collect()
+    }
+}
+
+/// Whether a file in an archive is there for its users.
+fn is_shown(name: &str) -> bool {
+    name.split('/').all(|part| !part.starts_with('.') && part != "__MACOSX")
+}
+
+/// The model of an archive: the only one there.
+pub(in crate::load) fn only_model(archive: Arc<Archive>, limits: &Limits) -> Result<Source, LoadError> {
+    let models = archive.models(Path::new(""));
+    let [Offered { name, .. }] = &models[..] else { return Err(none_or_several(&archive, &models).into()) };
+    let (name, note) = (PathBuf::from(name), models[0].note(&archive.path));
+    Ok(Source { note, ..source(archive, &name, limits)? })
+}
+
+/// The model of an archive that is named.
+pub(in crate::load) fn named_model(archive: Arc<Archive>, name: &Path, limits: &Limits) -> Result<Source, LoadError> {
+    if archive.has(name) {
+        return source(archive, name, limits);
+    }
+    let path = archive.path.join(name);
+    if archive.has_folder(name) {
+        let fault = Diagnostic::new("file-not-plain", path, "", "is a folder in an archive");
+        return Err(fault.remedy("name a file in it").into());
+    }
+    let models = archive.models(Path::new(""));
+    let (archive, name) = (archive.path.display(), shown(name));
+    let remedy = match (nearest(&name, models.iter().map(|model| model.name)), &models[..]) {
+        (Some(meant), _) => format!("did you mean '{archive}/{meant}'?"),
+        (None, [Offered { name, .. }, ..]) => {
+            format!("it has {} models, the first is '{archive}/{name}'", models.len())
+        }
+        (None, []) => "it has no model".into(),
+    };
+    Err(Diagnostic::new(FileFault::MISSING, path, "", "is not in the archive").remedy(remedy).into())
+}
+
+/// A file in an archive, in memory.
+pub(in crate::load) fn source(archive: Arc<Archive>, name: &Path, limits: &Limits) -> Result<Source, LoadError> {
+    let path = archive.path.join(name);
+    match archive.read(name, limits.file) {
+        Ok(bytes) => Ok(Source { path, bytes, within: Some(archive), note: None }),
+        Err(error) if error.kind() == ErrorKind::FileTooLarge => {
+            Err(too_large(&path, archive.length(name).unwrap_or_default(), limits).into())
+        }
+        Err(error) => Err(unreadable(error, &path)),
+    }
+}
+
+/// Why a model or an archive that was named cannot be read.
+pub(in crate::load) fn unreadable(error: io::Error, path: &Path) -> LoadError {
+    if let Some(fault) = ArchiveFault::of(&error) {
+        return fault.diagnose(path).into();
+    }
+    LoadError::Read { what: Box::new(Diagnostic::new("file-unreadable", path, "", "cannot be read")), source: error }
+}
+
+/// What is told where it is not clear which model of an archive is meant, and of one without any.
+fn none_or_several(archive: &Archive, models: &[Offered]) -> Diagnostic {
+    /// So many are told.
+    const TOLD: usize = 4;
+    let list = |names: &mut dyn Iterator<Item = &str>| {
+        names.take(TOLD).map(|name| format!("'{}'", shorten(name))).collect::<Vec<_>>().join(", ")
+    };
+    let (path, told) = (&archive.path, |code, text: String| Diagnostic::new(code, archive.path.as_path(), "", text));
+    let Some(first) = models.first() else {
+        let shown = || archive.entries.keys().map(String::as_str).filter(|name| is_shown(name));
+        let held = list(&mut shown());
+        let text = match shown().count() {
+            0 => "no file is in this archive".into(),
+            count if count > TOLD => format!("no model is in this archive: it has {held} and {} more", count - TOLD),
+            _ => format!("no model is in this archive: it has {held}"),
+        };
+        let remedy = match shown().find(|name| is_called_an_archive(Path::new(name))) {
+            Some(inner) => format!("unpack it, and name '{}'", shorten(inner)),
+            None => "meshray reads .glb, .gltf, .vrm, .obj, .ply, .stl and .nff files in it".into(),
+        };
+        return told("archive-empty", text).remedy(remedy);
+    };
+    let (count, held) = (models.len(), list(&mut models.iter().map(|model| model.name)));
+    let dots = if count > TOLD { ", …" } else { "" };
+    let example = format!("name one, as in '{}'", path.join(first.name).display());
+    let remedy =
+        if path.is_file() { example } else { "keep it as a file, and name one behind the path of that".into() };
+    told("archive-several", format!("{count} models are in this archive: {held}{dots}")).remedy(remedy)
+}

@@ -1,0 +1,64 @@
+//! Paths that lead into archives.
+
+use super::{Archive, ArchiveFault, is_archive_on_disk};
+use crate::load::limits::Limits;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
+
+/// By what it is known that a file is the same still: its length, and when it was changed.
+type Stamp = (u64, Option<SystemTime>);
+
+/// The archive that was looked into last: models of one archive are mostly read one after the other.
+static LAST: Mutex<Option<(PathBuf, Stamp, Arc<Archive>)>> = Mutex::new(None);
+
+/// Looks into an archive on disk, if that was not done just before; `None` if that file is none.
+///
+/// # Errors
+/// Those of [`Archive::open`].
+pub fn opened(path: &Path) -> io::Result<Option<Arc<Archive>>> {
+    if !is_archive_on_disk(path)? {
+        return Ok(None);
+    }
+    let metadata = path.metadata()?;
+    let stamp = (metadata.len(), metadata.modified().ok());
+    // Others that want the same wait for it.
+    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, _, archive)) = last.as_ref().filter(|(known, then, _)| known == path && *then == stamp) {
+        return Ok(Some(archive.clone()));
+    }
+    let archive = Arc::new(Archive::open(path)?);
+    *last = Some((path.to_path_buf(), stamp, archive.clone()));
+    Ok(Some(archive))
+}
+
+/// The path of a plain file that a path goes through as if it were a folder, and the rest of it.
+pub(crate) fn split(path: &Path) -> Option<(&Path, &Path)> {
+    let above = path.ancestors().find(|above| above.metadata().is_ok())?;
+    let rest = path.strip_prefix(above).ok()?;
+    (above.is_file() && above != path).then_some((above, rest))
+}
+
+/// The archive that a path leads into, and the path in it; `None` if it leads into none.
+///
+/// # Errors
+/// Those of [`Archive::open`].
+pub fn in_archive(path: &Path) -> io::Result<Option<(Arc<Archive>, &Path)>> {
+    let Some((above, rest)) = split(path) else { return Ok(None) };
+    Ok(opened(above)?.map(|archive| (archive, rest)))
+}
+
+/// Whether there is such a file, on disk or in an archive.
+pub fn is_there(path: &Path) -> bool {
+    path.exists() || in_archive(path).is_ok_and(|found| found.is_some_and(|(archive, name)| archive.has(name)))
+}
+
+/// Unpacks a file in an archive, by its whole path.
+///
+/// # Errors
+/// Those of the system, and an [`ArchiveFault`] as the inner error of one.
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let (archive, name) = in_archive(path)?.ok_or(ArchiveFault::None)?;
+    archive.read(name, Limits::default().file)
+}
