@@ -77,7 +77,7 @@ pub(crate) struct Context<'a> {
     pub meets_by_chance: bool,
     /// What such rays were found to meet seldom, and far brighter than all else, if anybody has looked.
     pub fireflies: Option<Arc<Fireflies>>,
-    /// Samples that pixels start with, at least: as many as were traced before the picture.
+    /// Samples of all pixels that are traced before the picture, with which they start; 0: none.
     pub first_samples: u32,
     /// These.
     pub ahead: Option<Arc<Ahead>>,
@@ -169,7 +169,7 @@ impl<'a> Context<'a> {
             gloss,
             meets_by_chance: settings.lens.is_some() || spreads,
             fireflies: None,
-            first_samples: 1,
+            first_samples: 0,
             ahead: None,
             highlight_reach: glint::reach(settings),
             seed: settings.seed,

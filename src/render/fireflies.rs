@@ -193,7 +193,7 @@ pub(super) fn look<P: Observer>(
     };
     let (each, mut counts, complete) = each_tile(context, accel, &tiles(width, height), &Quiet(progress), work);
     let all = each.into_iter().sum();
-    let mut rays = Rays { all, beside: if of_picture.is_some() { 0 } else { all } };
+    let mut rays = Rays { all, beside: all };
     // Who has cancelled wants no more of the picture, either.
     if !complete {
         return (rays, counts);
@@ -208,14 +208,14 @@ pub(super) fn look<P: Observer>(
     counts.extend(more);
     if complete {
         let again = pixels.len() as u64 * u64::from(AGAIN);
-        (rays.all, rays.beside) = (rays.all + again, rays.beside + again);
+        rays = Rays { all: all + again, beside: again + if of_picture.is_some() { 0 } else { all } };
         let (rare, told) = (answers.into_iter().flatten().collect(), in_cells(&asked, (CELL / step) as usize));
         let output = output(how.space, question.frame.background);
         let judge = Certainty::of(question.frame, how, output.as_ref(), context.scene.background);
         let missing = |light, more| judge.grey(light + more) - judge.grey(light);
         let fireflies = Arc::new(Fireflies::among(rare, &told, missing, missed_at_most(how)));
         context.fireflies = Some(fireflies);
-        context.first_samples = of_picture.unwrap_or(1);
+        context.first_samples = of_picture.unwrap_or(0);
         context.ahead = ahead.map(|ahead| Arc::new(ahead.into_inner().unwrap_or_else(PoisonError::into_inner)));
     }
     (rays, counts)

@@ -53,8 +53,8 @@ pub(super) fn render<A: Accel, P: Observer>(
     let first = sampler.first(tracer, std::iter::once(tile).chain(outermost.without(tile)))?;
     let mut done = sampler.finish(tracer, tile, &[&first])?;
     let beyond = if sampler.ahead.is_some() { 0 } else { outermost.pixels() - tile.pixels() };
-    done.rays_beyond = beyond as u64;
-    done.rays += done.rays_beyond;
+    done.rays_beyond += beyond as u64;
+    done.rays += beyond as u64;
     Some(done)
 }
 
@@ -64,7 +64,9 @@ struct Sampler<'a> {
     how: &'a Stochastic,
     judge: Certainty<'a>,
     fireflies: Option<&'a Fireflies>,
-    /// First samples of all pixels that are there already.
+    /// First samples of each pixel that are traced before the picture, …
+    first_samples: u32,
+    /// … and these, but for parts of a picture by themselves.
     ahead: Option<&'a Ahead>,
     /// Samples of a pixel after each round.
     rounds: Vec<u32>,
@@ -90,7 +92,7 @@ impl<'a> Sampler<'a> {
         let fireflies = context.fireflies.as_deref();
         let ahead = context.ahead.as_deref().filter(|ahead| ahead.samples(frame.settings.seed) > 0);
         let rounds = rounds(how, frame.settings, context.first_samples).collect();
-        Self { frame, how, judge, fireflies, ahead, rounds }
+        Self { frame, how, judge, fireflies, first_samples: context.first_samples, ahead, rounds }
     }
 
     /// Whether all pixels get a single sample at first.
@@ -287,9 +289,14 @@ impl<'a> Sampler<'a> {
         let (frame, tile) = (self.frame, done.tile);
         for pixel in pixels {
             if !tile.contains(pixel.at) {
-                // They are their own tile's, too; what is there already nobody traces again.
-                let rays = u64::from(pixel.facts.count - counted.max(self.known(0..pixel.facts.count)));
-                (done.rays, done.rays_around) = (done.rays + rays, done.rays_around + rays);
+                let count = pixel.facts.count;
+                let first = counted.max(self.known(0..count));
+                let around = u64::from(count - first);
+                // Among other tiles these are there already.
+                let beyond = if self.ahead.is_some() { 0 } else { u64::from(first - counted) };
+                done.rays_around += around;
+                done.rays_beyond += beyond;
+                done.rays += around + beyond;
                 continue;
             }
             done.rays += u64::from(pixel.facts.count - counted);
@@ -304,10 +311,9 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// How many of these samples, from the first on, are there already.
+    /// How many of these samples, from the first on, are traced before the picture.
     fn known(&self, samples: Range<u32>) -> u32 {
-        let known = self.ahead.map_or(0, |ahead| ahead.samples(self.frame.settings.seed));
-        known.clamp(samples.start, samples.end) - samples.start
+        self.first_samples.clamp(samples.start, samples.end) - samples.start
     }
 
     /// Traces what these pixels are missing of so many samples, round by round.
@@ -325,6 +331,24 @@ impl<'a> Sampler<'a> {
         Some(())
     }
 
+    /// Gives active pixels those of these samples that were traced before the picture; the others are left.
+    fn give_known(
+        &self,
+        (pixels, active): (&mut [Pixel], &[usize]),
+        samples: Range<u32>,
+        in_group: usize,
+    ) -> Range<u32> {
+        let Some(ahead) = self.ahead else { return samples };
+        let known = samples.start..samples.start + self.known(samples.clone());
+        for &pixel in active.iter().filter(|_| !known.is_empty()) {
+            let pixel = &mut pixels[pixel];
+            let OfPixel { samples, by_chance, firsts } = ahead.of(pixel.at, known.clone());
+            pixel.expect(self.fireflies, by_chance);
+            pixel.take(samples, firsts, in_group);
+        }
+        known.end..samples.end
+    }
+
     /// Traces these samples of all active pixels, in batches.
     fn trace<A: Accel, P: Observer>(
         &self,
@@ -338,16 +362,7 @@ impl<'a> Sampler<'a> {
         }
         let first = samples.start;
         let in_group = (samples.end as usize).div_ceil(GROUPS);
-        let known = first..first + self.known(samples.clone());
-        let samples = known.end..samples.end;
-        if let Some(ahead) = self.ahead.filter(|_| !known.is_empty()) {
-            for &pixel in active {
-                let pixel = &mut pixels[pixel];
-                let OfPixel { samples, by_chance, firsts } = ahead.of(pixel.at, known.clone());
-                pixel.expect(self.fireflies, by_chance);
-                pixel.take(samples, firsts, in_group);
-            }
-        }
+        let samples = self.give_known((pixels, active), samples, in_group);
         if samples.is_empty() {
             return Some(());
         }
@@ -378,7 +393,7 @@ impl<'a> Sampler<'a> {
 fn rounds(how: &Stochastic, settings: &Settings, known: u32) -> impl Iterator<Item = u32> + use<> {
     let (fewest, most) = how.powers();
     // In a single row or column there are not enough pixels beside one.
-    let least = if settings.width.min(settings.height) < 2 { SURE } else { known };
+    let least = if settings.width.min(settings.height) < 2 { SURE } else { 1 };
     std::iter::successors(Some(fewest.max(least).max(known).min(most)), move |&last| {
         (last < most).then(|| (2 * last).max(SURE).min(most))
     })
@@ -401,7 +416,7 @@ mod tests {
             let how = Stochastic { min_samples, max_samples, ..Stochastic::default() };
             super::rounds(&how, &settings, known).collect::<Vec<_>>()
         };
-        let rounds_of = |min_samples, max_samples, height| rounds_from(1, min_samples, max_samples, height);
+        let rounds_of = |min_samples, max_samples, height| rounds_from(0, min_samples, max_samples, height);
         let rounds = |min_samples, max_samples| rounds_of(min_samples, max_samples, 9);
         assert_eq!(rounds(1, 64), [1, 4, 8, 16, 32, 64]);
         assert_eq!(rounds(2, 8), [2, 4, 8]);
