@@ -88,6 +88,7 @@ fn of_several_models_one_has_to_be_named() {
     let loaded = read("a/two.obj").unwrap();
     assert_eq!(names(&loaded), [path.join("a/two.obj").to_str().unwrap()]);
     assert_eq!(loaded.warnings[0].code, "file-missing", "its library of materials");
+    assert!(loaded.warnings[0].remedy.contains("unpack it"), "{}", loaded.warnings[0]);
     let (code, text) = fault(read("a/tow.obj"));
     assert!(code == "file-missing" && text.contains("pack.ZIP/a/two.obj'?"), "{code}: {text}");
     let (code, text) = fault(read("zebra"));

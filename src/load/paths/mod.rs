@@ -8,7 +8,7 @@
 mod tests;
 mod volume;
 
-use super::archive::{ArchiveFault, source};
+use super::archive::{ArchiveFault, source, split};
 use super::limits::{Budget, OverBudget};
 use super::{Diagnostic, Limits, LoadError, LoadOptions, Source};
 use crate::stopwatch::{Spent, Stopwatch};
@@ -154,6 +154,9 @@ impl FileFault {
                 "name the model's file instead of standard input, and its root with --root".into(),
             ),
             Self::OutsideArchive(_) => ("file-outside-root", "unpack it, with what is missing in its place".into()),
+            Self::Missing(_) if split(file).is_some() => {
+                (Self::MISSING, "look for an archive with all files, or unpack it and put this one in its place".into())
+            }
             Self::Missing(name) if name.contains(['/', '\\']) => {
                 (Self::MISSING, "put it there, as seen from the model's folder".into())
             }
