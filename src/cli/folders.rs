@@ -5,7 +5,6 @@ use super::message::Severity;
 use crate::load::archive::{ArchiveFault, in_archive, is_called_an_archive, opened, split};
 use crate::load::{Diagnostic, is_called_a_model};
 use std::collections::HashSet;
-use std::ffi::OsStr;
 use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
@@ -24,14 +23,14 @@ pub(super) fn unfold(inputs: &[PathBuf], mut tell: impl FnMut(Severity, &Diagnos
         let mut found = Found::default();
         if is_folder(input) {
             found.add_folder(input);
-            if found.models.is_empty() && found.told.is_empty() {
+            if found.models.is_empty() && found.told.iter().all(|(.., exit)| *exit == Exit::Done) {
                 let remedy =
                     "name one with .glb, .gltf, .vrm, .obj, .ply, .stl, .nff or .zip files, or a scene file itself";
                 let fault = Diagnostic::new("folder-empty", input, "", "no model is in this folder").remedy(remedy);
                 found.told.push((Severity::Error, fault, Exit::Input));
             }
         } else if !found.add_several(input) {
-            models.push(input.clone());
+            models.push(if is_archive(input) { without_slash(input) } else { input.clone() });
         }
         for (severity, what, exit) in found.told {
             tell(severity, &what);
@@ -75,9 +74,11 @@ pub(super) fn way_below(folders: &[PathBuf], input: &Path) -> PathBuf {
     let rest = |path: &Path| path.strip_prefix(folder).map_or_else(|_| PathBuf::new(), Path::to_path_buf);
     let way = match split(input) {
         Some((archive, name)) if archive.starts_with(folder) => {
-            let inside = name.parent().unwrap_or(Path::new(""));
             // Of one that was named itself nothing is left but its own name.
-            rest(archive).with_file_name(archive.file_stem().unwrap_or_default()).join(inside)
+            let way = rest(archive).with_file_name(archive.file_stem().unwrap_or_default());
+            // To join nothing would end it in a slash.
+            let inside = name.parent().filter(|inside| !inside.as_os_str().is_empty());
+            inside.map_or_else(|| way.clone(), |inside| way.join(inside))
         }
         _ => rest(input).parent().map(Path::to_path_buf).unwrap_or_default(),
     };
@@ -96,19 +97,35 @@ struct Found {
 impl Found {
     /// All models in a folder and in those in it, in the order of their names, and what cannot be read.
     fn add_folder(&mut self, folder: &Path) {
-        let mut left = vec![folder.to_path_buf()];
+        let (mut left, mut archives) = (vec![folder.to_path_buf()], Vec::new());
         while let Some(folder) = left.pop() {
-            if let Err(error) = self.look_into(&folder, &mut left) {
+            if let Err(error) = self.look_into(&folder, &mut left, &mut archives) {
                 let fault = Diagnostic::new("folder-unreadable", folder, "", error.to_string());
                 self.told.push((Severity::Error, fault, Exit::Failed));
+            }
+        }
+        // All folders with models, and all models without their extensions.
+        let known: HashSet<PathBuf> = {
+            let ways = self.models.iter().flat_map(|model| model.ancestors().skip(1).take_while(|way| *way != folder));
+            ways.map(Path::to_path_buf).chain(self.models.iter().map(|model| model.with_extension(""))).collect()
+        };
+        archives.sort_unstable();
+        for archive in archives {
+            let unpacked = archive.with_extension("");
+            if known.contains(&unpacked) {
+                let text =
+                    format!("left out, as '{}' is beside it", unpacked.file_name().unwrap_or_default().display());
+                let note = Diagnostic::new("archive-unpacked", archive, "", text);
+                self.told.push((Severity::Info, note.remedy("name the archive itself to have it"), Exit::Done));
+            } else {
+                self.add_archive(&archive);
             }
         }
         self.models.sort_unstable();
     }
 
-    /// The models in a folder itself and in the archives there, and the folders in it.
-    fn look_into(&mut self, folder: &Path, folders: &mut Vec<PathBuf>) -> io::Result<()> {
-        let (mut archives, mut names) = (Vec::new(), HashSet::new());
+    /// The models in a folder itself, and the folders and the archives in it.
+    fn look_into(&mut self, folder: &Path, folders: &mut Vec<PathBuf>, archives: &mut Vec<PathBuf>) -> io::Result<()> {
         for entry in fs::read_dir(folder)? {
             let entry = entry?;
             if entry.file_name().as_encoded_bytes().starts_with(b".") {
@@ -116,25 +133,11 @@ impl Found {
             }
             let (path, kind) = (entry.path(), entry.file_type()?);
             if kind.is_dir() {
-                names.insert(entry.file_name());
                 folders.push(path);
             } else if is_called_a_model(&path) && path.is_file() {
-                names.extend(path.file_stem().map(OsStr::to_os_string));
                 self.models.push(path);
             } else if is_archive(&path) {
                 archives.push(path);
-            }
-        }
-        archives.sort_unstable();
-        for archive in archives {
-            let unpacked = archive.file_stem().filter(|stem| names.contains(*stem));
-            match unpacked {
-                Some(stem) => {
-                    let text = format!("left out, as '{}' is beside it", stem.display());
-                    let note = Diagnostic::new("archive-unpacked", archive, "", text);
-                    self.told.push((Severity::Info, note.remedy("name the archive itself to have it"), Exit::Done));
-                }
-                None => self.add_archive(&archive),
             }
         }
         Ok(())
@@ -173,7 +176,7 @@ impl Found {
             return false;
         }
         for model in models {
-            let note = model.note(path).map(|note| (Severity::Info, note, Exit::Done));
+            let note = model.note(path).map(|note| (Severity::Warning, note, Exit::Done));
             self.told.extend(note);
             self.models.push(path.join(model.name));
         }
@@ -219,6 +222,7 @@ mod tests {
         fs::write(dir.path().join("all/pack.zip"), "").unwrap();
         let below = |folder: &str, input: &str| way_below(&[dir.path().join(folder)], &dir.path().join(input));
         assert_eq!(below("", "all/pack.zip"), Path::new("all"));
+        assert_eq!(below("all", "all/pack.zip/x.glb").as_os_str(), "pack", "and no slash");
         assert_eq!(below("", "all/pack.zip/b/x.glb"), Path::new("all/pack/b"));
         assert_eq!(below("all/pack.zip", "all/pack.zip/b/x.glb"), Path::new("pack/b"));
         assert_eq!(below("all/pack.zip/b", "all/pack.zip/b/c/x.glb"), Path::new("c"));

@@ -46,8 +46,22 @@ pub(super) fn up_to_date(job: &RenderJob, batch: &Batch, shot: &Shot) -> Option<
     let same = made_of.get("asked").and_then(Value::as_str) == Some(asked(job, batch, shot).as_str())
         && made_of.get("gaps").and_then(Value::as_bool) == Some(false)
         && !files.is_empty()
-        && files.iter().all(is_same);
+        && files.iter().all(is_same)
+        && batch.inputs.iter().all(|input| is_still_meant(input, files));
     same.then(|| files.keys().map(PathBuf::from).collect())
+}
+
+/// Whether an archive would still be taken for that model of it which was read.
+fn is_still_meant(input: &Path, files: &Map<String, Value>) -> bool {
+    let archive = if input.is_file() { archive::opened(input) } else { Ok(None) };
+    match archive {
+        Ok(None) => true,
+        Ok(Some(archive)) => match &archive.models(Path::new(""))[..] {
+            [only] => input.join(only.name).to_str().is_some_and(|path| files.contains_key(path)),
+            _ => false,
+        },
+        Err(_) => false,
+    }
 }
 
 /// The same once the model is loaded.

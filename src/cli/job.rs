@@ -11,6 +11,7 @@ use super::{folders, message};
 use crate::accel::{AccelChoice, AccelKind, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::LoadOptions;
+use crate::load::archive::on_disk;
 use crate::render::{Cost, Instancing};
 use crate::scene::Background;
 use std::collections::HashSet;
@@ -298,7 +299,7 @@ fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -
     // A name that is made of theirs may be that of what belongs to another of them.
     let is_made = args.output.as_deref().is_some_and(|name| name.contains('{'));
     let sources: HashSet<PathBuf> =
-        args.inputs.iter().filter(|_| is_made).map(|input| outputs::folder_of(input)).collect();
+        args.inputs.iter().filter(|_| is_made).map(|input| outputs::folder_of(on_disk(input))).collect();
     let mut batches = Vec::new();
     let mut frame = 0;
     for inputs in groups {

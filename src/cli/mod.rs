@@ -143,7 +143,14 @@ fn render_command(typed: &RenderArgs) -> Exit {
             Err((fault, exit)) => return messages.fail(&fault, exit),
         }
     }
-    let (models, unfolded) = folders::unfold(&args.inputs, |severity, what| messages.say(severity, what));
+    let mut doubtful = Vec::new();
+    let (models, unfolded) = folders::unfold(&args.inputs, |severity, what| {
+        messages.say(severity, what);
+        doubtful.extend((severity == Severity::Warning).then(|| what.file.clone()));
+    });
+    if let Some(file) = doubtful.first().filter(|_| args.strict) {
+        return messages.fail(&read::not_strict(doubtful.len(), file), Exit::Input);
+    }
     if models.is_empty() && unfolded != Exit::Done {
         return unfolded;
     }

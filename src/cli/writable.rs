@@ -26,8 +26,7 @@ impl Sources {
     pub(super) fn add(&self, files: impl IntoIterator<Item: AsRef<Path>>) {
         let named = files.into_iter().filter(|file| file.as_ref() != Path::new("-"));
         // Of what lies in an archive the archive is read.
-        let on_disk = |file: &Path| archive::split(file).map_or_else(|| identity(file), |(above, _)| identity(above));
-        let files: Vec<PathBuf> = named.map(|file| on_disk(file.as_ref())).collect();
+        let files: Vec<PathBuf> = named.map(|file| identity(archive::on_disk(file.as_ref()))).collect();
         self.known().extend(files);
     }
 

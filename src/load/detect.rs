@@ -141,11 +141,14 @@ fn marked_up(text: &[u8]) -> Option<&'static str> {
     text.starts_with(b"<").then(|| if has(text, b"<COLLADA") { "a COLLADA file" } else { "an XML or HTML file" })
 }
 
+/// Extensions of models, that which says most of a model first: with materials and all that belongs to it in one file, with
+/// materials, without.
+pub(super) const MODELS: [&str; 7] = ["glb", "gltf", "vrm", "obj", "ply", "stl", "nff"];
+
 /// Whether a file has a name as models have: one that ends in `.glb`, `.gltf`, `.vrm` (avatars in GLB), `.obj`, `.ply`, `.stl` or
 /// `.nff`, in letters of either case.
 pub fn is_called_a_model(path: &Path) -> bool {
-    let is = |known: &&str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(known));
-    ["glb", "gltf", "vrm", "obj", "ply", "stl", "nff"].iter().any(is)
+    MODELS.iter().any(|known| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(known)))
 }
 
 fn foreign(source: &Source, kind: &str) -> Diagnostic {

@@ -4,7 +4,7 @@
 //! on one line although names may hold spaces. A file found elsewhere than its name says costs a warning; everything is
 //! read through the [`Resolver`], so nothing outside the root is.
 
-use crate::load::paths::{FileFault, Found, Resolver, shown};
+use crate::load::paths::{FileFault, Found, Resolver};
 use std::path::{Component, Path, PathBuf};
 
 /// Reads files by careless names.
@@ -53,8 +53,8 @@ impl Finder<'_> {
         }
         self.elsewhere(&slashed, folders).ok_or_else(|| match fault {
             // As written, not with the folder it was looked for in.
-            Some(FileFault::Missing(_)) | None => FileFault::Missing(shown(Path::new(name))),
-            Some(fault) => fault,
+            Some(fault) if !fault.is_missing() => fault,
+            _ => self.resolver.missing(Path::new(name)),
         })
     }
 
@@ -96,7 +96,7 @@ impl Finder<'_> {
         let mut start = 0;
         while start < words.len() {
             if *self.missed >= MISSES {
-                out.push(Err(FileFault::Missing(shown(Path::new(&words[start..].join(" "))))));
+                out.push(Err(self.resolver.missing(Path::new(&words[start..].join(" ")))));
                 break;
             }
             let name = |end: usize| words[start..end].join(" ");

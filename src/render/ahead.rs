@@ -10,7 +10,6 @@ use std::ops::Range;
 /// The same number of samples of each pixel.
 #[derive(Debug)]
 pub(super) struct Ahead {
-    seed: u64,
     columns: usize,
     /// Of each pixel, a power of two.
     samples: u32,
@@ -36,14 +35,7 @@ impl Ahead {
         let (columns, rows) = (settings.width as usize, settings.height as usize);
         let count = columns * rows * samples as usize;
         let firsts = vec![FirstSurface::NONE; if settings.layers { count } else { 0 }];
-        Self {
-            seed: settings.seed,
-            columns,
-            samples,
-            each: vec![Sample::default(); count],
-            by_chance: vec![false; count],
-            firsts,
-        }
+        Self { columns, samples, each: vec![Sample::default(); count], by_chance: vec![false; count], firsts }
     }
 
     /// Keeps the `index`th samples of these pixels, which were traced last.
@@ -55,11 +47,6 @@ impl Ahead {
                 *to = *first;
             }
         }
-    }
-
-    /// How many there are of each pixel of a picture with this seed.
-    pub(super) fn samples(&self, seed: u64) -> u32 {
-        if seed == self.seed { self.samples } else { 0 }
     }
 
     /// Those of one pixel with these numbers, no more than there are.
@@ -129,7 +116,7 @@ mod tests {
             };
             let mut context = Context::new(&scene, &world, &textures, &settings);
             let (rays, looked) = fireflies::look::<RayCounts>(&job, &mut context, Closely::All, &());
-            let kept = context.ahead.as_ref().map_or(0, |ahead| ahead.samples(settings.seed));
+            let kept = context.ahead.as_ref().map_or(0, |ahead| ahead.samples);
             assert_eq!(kept, context.first_samples);
             assert_eq!(rays.all - rays.beside, u64::from(kept * width * height), "all of them are the picture's");
             let primary = |counts: &[crate::render::by_class::ByClass<RayCounts>]| -> u64 {
@@ -153,10 +140,8 @@ mod tests {
     }
 
     #[test]
-    fn of_another_seed_there_is_none() {
-        let settings = Settings { width: 3, height: 2, seed: 7, ..Settings::default() };
-        let ahead = Ahead::new(&settings, 4);
-        assert_eq!([7, 8].map(|seed| ahead.samples(seed)), [4, 0]);
+    fn no_more_is_told_of_a_pixel_than_there_is() {
+        let ahead = Ahead::new(&Settings { width: 3, height: 2, ..Settings::default() }, 4);
         assert_eq!([0..4, 1..3, 2..16].map(|numbers| ahead.of((2, 1), numbers).samples.len()), [4, 2, 2]);
     }
 }

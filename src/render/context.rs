@@ -212,7 +212,7 @@ impl<'a> Context<'a> {
     /// The same with other random choices, and other samples.
     pub(super) fn resampled(&self, settings: &Settings) -> Self {
         let (highlight_reach, gloss) = (glint::reach(settings), self.gloss.of_samples(settings));
-        Self { seed: settings.seed, highlight_reach, gloss, ..self.clone() }
+        Self { seed: settings.seed, highlight_reach, gloss, ahead: None, ..self.clone() }
     }
 
     /// Whether rays to glare end at this material: rays that pass it may go on another way, or many, and leave some light behind

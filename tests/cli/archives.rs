@@ -109,6 +109,61 @@ endsolid
     ]);
     folder.render(&["all/table.zip", "--strict"]).ends(3).says(&["chair.stl", "--strict"]);
     folder.render(&["all/table.zip/chair.obj", "--strict"]).ends(0);
+    let more = zip(&[("a.obj", CUBE.as_bytes()), ("a.ply", b""), ("b.obj", CUBE.as_bytes())]);
+    let folder = folder.file("more.zip", more);
+    folder
+        .render(&["more.zip", "--strict"])
+        .ends(3)
+        .says(&["'a.obj' is drawn, and not 'a.ply'", "not rendered: --strict"]);
+    folder.render(&["more.zip"]).ends(0).says(&["2 pictures of 2 inputs, 1 warning"]);
+}
+
+#[test]
+fn an_archive_beside_a_folder_of_its_name_without_models_is_drawn() {
+    let folder =
+        Folder::new().file("all/chair.zip", zip(&[("chair.obj", CUBE.as_bytes())])).file("all/chair/a.png", "");
+    folder.render(&["all", "-o", "thumbs/"]).ends(0);
+    assert!(folder.has("thumbs/chair.png"));
+    folder.render(&["all/chair.zip/"]).ends(0);
+    assert!(folder.has("chair.png"));
+}
+
+#[test]
+fn a_picture_is_not_up_to_date_where_an_archive_stands_for_another_model_by_now() {
+    let pack = |files: &[(&str, &[u8])]| zip(files);
+    let stl = b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
+    let folder = Folder::new().file("chair.zip", pack(&[("chair.stl", stl)]));
+    let update = || folder.render(&["chair.zip", "--update"]).ends(0);
+    update();
+    update().says(&["is up to date"]);
+    std::fs::write(folder.path("chair.zip"), pack(&[("chair.stl", stl), ("chair.obj", CUBE.as_bytes())])).unwrap();
+    update().says(&["chair.png: 32×24"]);
+    update().says(&["is up to date"]);
+    // Where a scene file shows it, too.
+    std::fs::write(folder.path("scene.toml"), "[[models]]\nfile = 'chair.zip'\n").unwrap();
+    let update = || folder.render(&["scene.toml", "--update"]).ends(0);
+    update();
+    update().says(&["is up to date"]);
+    std::fs::write(
+        folder.path("chair.zip"),
+        pack(&[
+            ("chair.stl", stl),
+            ("chair.obj", CUBE.as_bytes()),
+            ("chair.gltf", b"{\"asset\": {\"version\": \"2.0\"}}"),
+        ]),
+    )
+    .unwrap();
+    folder.render(&["scene.toml", "--update", "--allow-empty"]).ends(0).says(&["scene.png: 32×24"]);
+}
+
+#[test]
+fn pictures_beside_an_archive_that_others_made_are_not_replaced() {
+    let folder = downloads().file("all/one.png", "mine");
+    folder
+        .render(&["all/pack.zip", "-o", "all/{stem}.png"])
+        .ends(1)
+        .says(&["one.png", "no picture that meshray wrote"]);
+    assert_eq!(folder.read("all/one.png"), b"mine");
 }
 
 #[test]

@@ -9,24 +9,23 @@ mod model;
 mod opened;
 mod tests;
 
-pub use model::{Offered, is_called_an_archive};
+pub use model::Offered;
+pub(crate) use model::is_called_an_archive;
 pub(super) use model::{named_model, only_model, source, unreadable};
-pub(crate) use opened::split;
-pub use opened::{in_archive, is_there, opened, read};
+pub(crate) use opened::{in_archive, is_there, on_disk, opened, read, split};
 
 use super::Diagnostic;
 use super::detect::{ZIP, is_called_a_model, is_zipped_kind};
-use super::paths::lexical;
 use flate2::read::DeflateDecoder;
 use rawzip::{CompressionMethod, ReaderAt, ZipArchive, ZipArchiveEntryWayfinder, ZipFileHeaderRecord, ZipLocator};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
-use std::path::{Component, Path, PathBuf};
+use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
-/// Bytes of the directory of an archive that are read at most: half a million names and more.
-const DIRECTORY: u64 = 1 << 26;
+/// Bytes of the directory of an archive that are read at most: of more than a hundred thousand names.
+const DIRECTORY: u64 = 1 << 24;
 
 /// Bytes of memory that a byte of the directory becomes, at most: names are short, and each comes with a few numbers.
 const PER_BYTE: u64 = 4;
@@ -172,10 +171,9 @@ impl Archive {
     }
 
     fn new(path: &Path, reader: Box<dyn ReaderAt + Send + Sync>, length: u64) -> io::Result<Self> {
-        let damaged = |error: rawzip::Error| ArchiveFault::Damaged(lower(&error.to_string()));
+        let damaged = |error| told(error, ArchiveFault::Damaged);
         let mut chunk = vec![0; CHUNK];
-        let zip =
-            ZipLocator::new().locate_in_reader(reader, &mut chunk, length).map_err(|(_, error)| damaged(error))?;
+        let zip = located(reader, &mut chunk, length).map_err(damaged)?;
         let directory = zip.end_offset().saturating_sub(zip.directory_offset());
         if directory > DIRECTORY {
             return Err(ArchiveFault::Crowded(directory).into());
@@ -269,8 +267,7 @@ impl Archive {
         if entry.is_encrypted {
             return Err(ArchiveFault::Encrypted.into());
         }
-        let spoiled = |why: String| ArchiveFault::Spoiled(lower(&why));
-        let found = self.zip.get_entry(entry.way).map_err(|error| spoiled(error.to_string()))?;
+        let found = self.zip.get_entry(entry.way).map_err(|error| told(error, ArchiveFault::Spoiled))?;
         let packed: Box<dyn Read + '_> = match entry.method {
             CompressionMethod::STORE => Box::new(found.reader()),
             CompressionMethod::DEFLATE => Box::new(DeflateDecoder::new_with_buf(found.reader(), vec![0; PACKED])),
@@ -287,11 +284,41 @@ impl Archive {
             Ok(_) => Ok(bytes),
             Err(error) => match error.kind() {
                 ErrorKind::InvalidData | ErrorKind::InvalidInput | ErrorKind::UnexpectedEof => {
-                    Err(spoiled(error.to_string()).into())
+                    Err(ArchiveFault::Spoiled(lower(&error.to_string())).into())
                 }
                 _ => Err(error),
             },
         }
+    }
+}
+
+/// Finds the directory of an archive of so many bytes: behind it there may be a remark, in which another seems to begin.
+fn located<R: ReaderAt>(mut reader: R, chunk: &mut [u8], length: u64) -> Result<ZipArchive<R>, rawzip::Error> {
+    /// Directories that are tried; bounds the time.
+    const TRIES: usize = 16;
+    let mut end = length;
+    for left in (0..TRIES).rev() {
+        let error = match ZipLocator::new().locate_in_reader(reader, chunk, end) {
+            Ok(zip) => return Ok(zip),
+            Err((back, error)) => {
+                reader = back;
+                error
+            }
+        };
+        match error.eocd_offset().filter(|at| left > 0 && *at < end) {
+            Some(at) => end = at,
+            None => return Err(error),
+        }
+    }
+    // The last try ends in the loop.
+    Err(rawzip::Error::from(rawzip::ErrorKind::MissingEndOfCentralDirectory))
+}
+
+/// An error as that of the system which it is, or as a fault of the archive.
+fn told(error: rawzip::Error, fault: impl Fn(String) -> ArchiveFault) -> io::Error {
+    match error.into_kind() {
+        rawzip::ErrorKind::IO(error) if error.kind() != ErrorKind::UnexpectedEof => error,
+        other => fault(lower(&other.to_string())).into(),
     }
 }
 
@@ -302,14 +329,20 @@ fn name_of(bytes: &[u8]) -> Option<String> {
     plain(Path::new(name.trim_start_matches('/'))).filter(|name| !is_folder && !name.is_empty())
 }
 
-/// A path in an archive, with `/` between its folders; `None` if it leads out.
+/// A path in an archive, with `/` between its folders; `None` if it leads out. What other systems take for a drive is a name.
 fn plain(path: &Path) -> Option<String> {
-    let clean = lexical(path);
-    let part = |part| match part {
-        Component::Normal(part) => part.to_str(),
-        _ => None,
-    };
-    let parts: Vec<&str> = clean.components().map(part).collect::<Option<_>>()?;
+    let text = path.to_str()?;
+    let text = if MAIN_SEPARATOR == '/' { text.into() } else { text.replace(MAIN_SEPARATOR, "/") };
+    let mut parts = Vec::new();
+    for (i, part) in text.split('/').enumerate() {
+        match part {
+            // From the root on.
+            "" if i == 0 && text.len() > 1 => return None,
+            "" | "." => {}
+            ".." => _ = parts.pop()?,
+            part => parts.push(part),
+        }
+    }
     Some(parts.join("/"))
 }
 

@@ -1,7 +1,7 @@
 //! Which of the files in an archive is the model.
 
 use super::{Archive, ArchiveFault};
-use crate::load::detect::is_called_a_model;
+use crate::load::detect::{MODELS, is_called_a_model};
 use crate::load::limits::Limits;
 use crate::load::paths::{FileFault, shorten, shown};
 use crate::load::suggest::nearest;
@@ -10,9 +10,6 @@ use std::collections::BTreeMap;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Kinds of files of one model, the best first: with materials and all that belongs to it in one file, with materials, without.
-const KINDS: [&str; 7] = ["glb", "gltf", "vrm", "obj", "ply", "stl", "nff"];
 
 /// A model in an archive.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -35,7 +32,7 @@ impl Offered<'_> {
 }
 
 /// Whether a file has the name of a zip archive.
-pub fn is_called_an_archive(path: &Path) -> bool {
+pub(crate) fn is_called_an_archive(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zip"))
 }
 
@@ -51,7 +48,7 @@ impl Archive {
         let offered = by_stem.into_values().map(|mut files| {
             files.sort_by_key(|name| {
                 let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
-                KINDS.iter().position(|kind| extension.eq_ignore_ascii_case(kind))
+                MODELS.iter().position(|kind| extension.eq_ignore_ascii_case(kind))
             });
             Offered { name: files.remove(0), others: files }
         });
@@ -86,6 +83,7 @@ pub(in crate::load) fn named_model(archive: Arc<Archive>, name: &Path, limits: &
     let (archive, name) = (archive.path.display(), shown(name));
     let remedy = match (nearest(&name, models.iter().map(|model| model.name)), &models[..]) {
         (Some(meant), _) => format!("did you mean '{archive}/{meant}'?"),
+        (None, [Offered { name, .. }]) => format!("its model is '{archive}/{name}'"),
         (None, [Offered { name, .. }, ..]) => {
             format!("it has {} models, the first is '{archive}/{name}'", models.len())
         }

@@ -2,13 +2,23 @@
 
 use super::{Archive, ArchiveFault, is_archive_on_disk};
 use crate::load::limits::Limits;
+use std::fs::Metadata;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
-/// By what it is known that a file is the same still: its length, and when it was changed.
-type Stamp = (u64, Option<SystemTime>);
+/// By what it is known that a file is the same still: its length, when it was changed, and which it is on its disk, where that
+/// can be asked.
+type Stamp = (u64, Option<SystemTime>, u64);
+
+fn stamp(metadata: &Metadata) -> Stamp {
+    #[cfg(unix)]
+    let file = std::os::unix::fs::MetadataExt::ino(metadata);
+    #[cfg(not(unix))]
+    let file = 0;
+    (metadata.len(), metadata.modified().ok(), file)
+}
 
 /// The archive that was looked into last: models of one archive are mostly read one after the other.
 static LAST: Mutex<Option<(PathBuf, Stamp, Arc<Archive>)>> = Mutex::new(None);
@@ -17,12 +27,11 @@ static LAST: Mutex<Option<(PathBuf, Stamp, Arc<Archive>)>> = Mutex::new(None);
 ///
 /// # Errors
 /// Those of [`Archive::open`].
-pub fn opened(path: &Path) -> io::Result<Option<Arc<Archive>>> {
+pub(crate) fn opened(path: &Path) -> io::Result<Option<Arc<Archive>>> {
     if !is_archive_on_disk(path)? {
         return Ok(None);
     }
-    let metadata = path.metadata()?;
-    let stamp = (metadata.len(), metadata.modified().ok());
+    let stamp = stamp(&path.metadata()?);
     // Others that want the same wait for it.
     let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, _, archive)) = last.as_ref().filter(|(known, then, _)| known == path && *then == stamp) {
@@ -40,17 +49,22 @@ pub(crate) fn split(path: &Path) -> Option<(&Path, &Path)> {
     (above.is_file() && above != path).then_some((above, rest))
 }
 
+/// The file on disk that is read for a path: the archive that it leads into, or what it names itself.
+pub(crate) fn on_disk(path: &Path) -> &Path {
+    split(path).map_or(path, |(above, _)| above)
+}
+
 /// The archive that a path leads into, and the path in it; `None` if it leads into none.
 ///
 /// # Errors
 /// Those of [`Archive::open`].
-pub fn in_archive(path: &Path) -> io::Result<Option<(Arc<Archive>, &Path)>> {
+pub(crate) fn in_archive(path: &Path) -> io::Result<Option<(Arc<Archive>, &Path)>> {
     let Some((above, rest)) = split(path) else { return Ok(None) };
     Ok(opened(above)?.map(|archive| (archive, rest)))
 }
 
 /// Whether there is such a file, on disk or in an archive.
-pub fn is_there(path: &Path) -> bool {
+pub(crate) fn is_there(path: &Path) -> bool {
     path.exists() || in_archive(path).is_ok_and(|found| found.is_some_and(|(archive, name)| archive.has(name)))
 }
 
@@ -58,7 +72,7 @@ pub fn is_there(path: &Path) -> bool {
 ///
 /// # Errors
 /// Those of the system, and an [`ArchiveFault`] as the inner error of one.
-pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     let (archive, name) = in_archive(path)?.ok_or(ArchiveFault::None)?;
     archive.read(name, Limits::default().file)
 }

@@ -135,10 +135,41 @@ fn scene_files_show_models_in_archives() {
         let folder = dir.path();
         loaded.iter().for_each(|loaded| assert_eq!(loaded.facts.files[1].path, folder.join("house.zip/m/house.obj")));
     }
-    // One in an archive, and one in memory, beside their models.
-    for loaded in [load(&at("house.zip/scene.toml"), &LoadOptions::default()), of_bytes(&files)] {
-        assert_eq!(loaded.unwrap().scene.prims(), 1);
+    let inside = load(&at("house.zip/scene.toml"), &LoadOptions::default()).unwrap();
+    assert_eq!(names(&inside)[1..].len(), 2, "beside its model");
+}
+
+#[test]
+fn files_on_disk_may_lie_in_archives_below_the_root_if_they_are_named_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    fs::create_dir(at("in")).unwrap();
+    for path in ["lib.zip", "in/lib.zip"] {
+        fs::write(at(path), zip(&[("mtl/paint.mtl", MTL)])).unwrap();
     }
+    fs::write(at("in/cut.zip"), &zip(&[("paint.mtl", MTL)])[..40]).unwrap();
+    for (library, code) in [
+        ("lib.zip/mtl/paint.mtl", None),
+        ("lib.zip/MTL/Paint.MTL", Some("file-elsewhere")),
+        ("lib.zip/gone.mtl", Some("file-missing")),
+        ("cut.zip/paint.mtl", Some("archive-unreadable")),
+        ("../lib.zip/mtl/paint.mtl", Some("file-outside-root")),
+    ] {
+        fs::write(at("in/a.obj"), OBJ.replace("paint.mtl", library)).unwrap();
+        let loaded = load(&at("in/a.obj"), &LoadOptions::default()).unwrap();
+        assert_eq!(loaded.warnings.first().map(|told| told.code), code, "{library}: {:?}", loaded.warnings);
+    }
+}
+
+#[test]
+fn a_remark_behind_an_archive_may_look_like_the_end_of_one() {
+    let mut bytes = zip(&[("a.obj", OBJ.as_bytes())]);
+    let remark = b"PK\x05\x06 was here, long ago and far away";
+    let at = bytes.len() - 2;
+    bytes[at..].copy_from_slice(&(remark.len() as u16).to_le_bytes());
+    bytes.extend(remark);
+    let loaded = load_bytes(Path::new("a.zip"), bytes, &LoadOptions::default()).unwrap();
+    assert_eq!(loaded.scene.prims(), 1);
 }
 
 #[test]
@@ -157,7 +188,7 @@ fn nothing_leads_out_of_an_archive() {
     let bytes = zip_verbatim(&names.map(|name| (name.as_bytes(), &b""[..])));
     let archive = Archive::from_bytes(Path::new("a.zip"), bytes).unwrap();
     let held: Vec<&str> = archive.models(Path::new("")).iter().map(|model| model.name).collect();
-    assert_eq!(held, ["C:/f.obj", "c.obj", "e.obj", "rooted/b.obj"]);
+    assert_eq!(held, ["C:/f.obj", "c.obj", "e.obj", "rooted/b.obj"], "whatever the system");
     assert!(!archive.has(Path::new("../a.zip/c.obj")) && archive.names_in(Path::new("..")).next().is_none());
     assert_eq!(archive.names_in(Path::new("rooted")).collect::<Vec<_>>(), ["b.obj"]);
     assert!(archive.has_folder(Path::new("")) && !archive.has_folder(Path::new("root")));

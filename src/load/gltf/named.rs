@@ -54,7 +54,9 @@ impl Reader<'_> {
     /// Where a file of that name lies, if one does. What was found and cannot be read is not looked for elsewhere, nor is
     /// what is on a network.
     fn near(&mut self, uri: &str, why: &FileFault) -> Option<PathBuf> {
-        if !matches!(why, FileFault::Missing(_) | FileFault::Scheme(_) | FileFault::Outside { .. }) {
+        let is_elsewhere =
+            matches!(why, FileFault::Scheme(_) | FileFault::Outside { .. } | FileFault::OutsideArchive(_));
+        if !(is_elsewhere || why.is_missing()) {
             return None;
         }
         let uri = uri.strip_prefix("file://").unwrap_or(uri);

@@ -8,7 +8,7 @@
 mod tests;
 mod volume;
 
-use super::archive::{ArchiveFault, source, split};
+use super::archive::{ArchiveFault, source};
 use super::limits::{Budget, OverBudget};
 use super::{Diagnostic, Limits, LoadError, LoadOptions, Source};
 use crate::stopwatch::{Spent, Stopwatch};
@@ -98,6 +98,9 @@ pub enum FileFault {
     /// There is no such file.
     #[error("'{0}' is not there")]
     Missing(String),
+    /// There is none in the archive of the model.
+    #[error("'{0}' is not in the archive")]
+    MissingInArchive(String),
     /// It is a folder, a device or the like.
     #[error("'{0}' is not a plain file")]
     NotAFile(String),
@@ -143,6 +146,19 @@ impl FileFault {
     /// The code of a file that is not there.
     pub const MISSING: &str = "file-missing";
 
+    /// Whether there is no such file.
+    pub fn is_missing(&self) -> bool {
+        matches!(self, Self::Missing(_) | Self::MissingInArchive(_))
+    }
+
+    /// What was said of a file when it was looked for or read: by the system, or of the archive that it lies in.
+    fn of(name: String, source: io::Error) -> Self {
+        match ArchiveFault::of(&source) {
+            Some(why) => Self::Packed { name, fault: why.to_string(), remedy: why.remedy() },
+            None => Self::Io { name, source },
+        }
+    }
+
     /// This fault as a message about `place` in `file`.
     pub fn diagnose(&self, file: &Path, place: &str) -> Diagnostic {
         let (code, remedy) = match self {
@@ -154,7 +170,7 @@ impl FileFault {
                 "name the model's file instead of standard input, and its root with --root".into(),
             ),
             Self::OutsideArchive(_) => ("file-outside-root", "unpack it, with what is missing in its place".into()),
-            Self::Missing(_) if split(file).is_some() => {
+            Self::MissingInArchive(_) => {
                 (Self::MISSING, "look for an archive with all files, or unpack it and put this one in its place".into())
             }
             Self::Missing(name) if name.contains(['/', '\\']) => {
@@ -188,7 +204,8 @@ impl Resolver {
         };
         let named = if folder.is_none() && base == current() { PathBuf::new() } else { base.clone() };
         let volume = source.within.clone().map_or(Volume::Disk, Volume::Archive);
-        let whole = |path: &PathBuf| volume.canonical(path).unwrap_or_else(|_| path.clone());
+        // Wherever it is.
+        let whole = |path: &PathBuf| volume.canonical(path, Path::new("")).unwrap_or_else(|_| path.clone());
         let base = whole(&base);
         let root = match (&source.within, &options.root) {
             (Some(archive), _) => archive.path().to_path_buf(),
@@ -236,12 +253,20 @@ impl Resolver {
         for path in [name, uri, &slashed].map(PathBuf::from) {
             match self.locate(&path) {
                 Ok(_) => return Ok((path, false)),
-                Err(FileFault::Missing(_)) => {}
+                Err(fault) if fault.is_missing() => {}
                 Err(fault) => return Err(fault),
             }
         }
         let in_any_case = self.in_any_case(Path::new(&slashed));
-        in_any_case.map(|path| (path, true)).ok_or_else(|| FileFault::Missing(shown(Path::new(name))))
+        in_any_case.map(|path| (path, true)).ok_or_else(|| self.missing(Path::new(name)))
+    }
+
+    /// That there is no file of this name.
+    pub(super) fn missing(&self, name: &Path) -> FileFault {
+        match self.volume {
+            Volume::Disk => FileFault::Missing(shown(name)),
+            Volume::Archive(_) => FileFault::MissingInArchive(shown(name)),
+        }
     }
 
     /// The path of an existing plain file below the root that differs from `name` only in the case of letters, be it of
@@ -251,7 +276,7 @@ impl Resolver {
         for part in name.components() {
             match part {
                 Component::CurDir => {}
-                Component::Normal(part) if self.volume.canonical(&self.base.join(&path).join(part)).is_err() => {
+                Component::Normal(part) if self.canonical(&path.join(part)).is_err() => {
                     let part = part.to_str()?.to_ascii_lowercase();
                     let listed = self.listed(&path)?.get(&part)?;
                     path.push(listed);
@@ -264,7 +289,7 @@ impl Resolver {
 
     /// What lies in a folder below the root: names by their small letters.
     fn listed(&mut self, folder: &Path) -> Option<&HashMap<String, String>> {
-        let folder = self.volume.canonical(&self.base.join(folder)).ok()?;
+        let folder = self.canonical(folder).ok()?;
         let folder = folder.starts_with(&self.root).then_some(folder)?;
         let list = |folder: &PathBuf| {
             let mut names = self.volume.names_in(folder);
@@ -285,10 +310,7 @@ impl Resolver {
             match why {
                 Unread::NotAFile => FileFault::NotAFile(name),
                 Unread::TooLarge(bytes) => FileFault::TooLarge { name, bytes, limit, remedy },
-                Unread::Io(source) => match ArchiveFault::of(&source) {
-                    Some(why) => FileFault::Packed { name, fault: why.to_string(), remedy: why.remedy() },
-                    None => FileFault::Io { name, source },
-                },
+                Unread::Io(source) => FileFault::of(name, source),
             }
         })?;
         self.reading += watch.read();
@@ -327,7 +349,7 @@ impl Resolver {
     /// Whether what is named so lies in the folder of a file that [`Self::locate`] has found.
     pub(super) fn lies_beside(&self, named: &Path, canonical: &Path) -> bool {
         let folder = named.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        self.volume.canonical(folder).is_ok_and(|folder| canonical.parent() == Some(&*folder))
+        self.volume.canonical(folder, &self.root).is_ok_and(|folder| canonical.parent() == Some(&*folder))
     }
 
     /// A file as it is named, from the folder of the model as that was.
@@ -357,21 +379,26 @@ impl Resolver {
             Volume::Disk => self.outside(shown.clone(), path),
         };
         let wanted = self.base.join(name);
-        match self.volume.canonical(&wanted) {
+        match self.canonical(name) {
             Ok(path) if path.starts_with(&self.root) => match self.volume.is_file(&path) {
                 Ok(true) => Ok(path),
                 Ok(false) => Err(FileFault::NotAFile(shown)),
-                Err(source) => Err(FileFault::Io { name: shown, source }),
+                Err(source) => Err(FileFault::of(shown, source)),
             },
             Ok(path) => Err(outside(&path)),
             // Whether a file outside the root exists is nobody's business.
             Err(_) if self.volume.leads_out(&wanted, &self.root) => Err(outside(&lexical(&wanted))),
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
                 self.gaps.set(true);
-                Err(FileFault::Missing(shown))
+                Err(self.missing(name))
             }
-            Err(source) => Err(FileFault::Io { name: shown, source }),
+            Err(source) => Err(FileFault::of(shown, source)),
         }
+    }
+
+    /// The one path of what is there under a name.
+    fn canonical(&self, name: &Path) -> io::Result<PathBuf> {
+        self.volume.canonical(&self.base.join(name), &self.root)
     }
 
     /// What is told of a file outside the root.

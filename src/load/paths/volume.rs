@@ -34,11 +34,12 @@ impl From<io::Error> for Unread {
 }
 
 impl Volume {
-    /// The one path of a file or folder that is there; an archive knows no links.
-    pub(super) fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
+    /// The one path of a file or folder that is there; an archive knows no links. Archives outside the root are not looked into,
+    /// whatever is in them.
+    pub(super) fn canonical(&self, path: &Path, root: &Path) -> io::Result<PathBuf> {
         match self {
             Self::Disk => match path.canonicalize() {
-                Err(error) if may_lead_into_a_file(&error) => in_file(path)?.ok_or(error),
+                Err(error) if may_lead_into_a_file(&error) => in_file(path, root)?.ok_or(error),
                 found => found,
             },
             Self::Archive(archive) => {
@@ -120,14 +121,15 @@ fn may_lead_into_a_file(error: &io::Error) -> bool {
     error.kind() == ErrorKind::NotADirectory || cfg!(windows) && error.kind() == ErrorKind::NotFound
 }
 
-/// The one path of what lies in an archive on disk; `None` where a path leads into none.
-fn in_file(path: &Path) -> io::Result<Option<PathBuf>> {
+/// The one path of what lies in an archive on disk, or would lie in one outside the root; `None` where a path leads into none.
+fn in_file(path: &Path, root: &Path) -> io::Result<Option<PathBuf>> {
     let Some((above, rest)) = split(path) else { return Ok(None) };
     let whole = above.canonicalize()?.join(rest);
-    let Some((archive, name)) = in_archive(&whole)? else { return Ok(None) };
-    if archive.has(name) {
-        Ok(archive.inside(&whole).map(|name| archive.path_of(&name)))
-    } else {
-        Err(ErrorKind::NotFound.into())
+    if !whole.starts_with(root) {
+        return Ok(Some(whole));
     }
+    let Some((archive, name)) = in_archive(&whole)? else { return Ok(None) };
+    let is_there = archive.has(name) || archive.has_folder(name);
+    let found = archive.inside(&whole).filter(|_| is_there).ok_or(ErrorKind::NotFound)?;
+    Ok(Some(archive.path_of(&found)))
 }

@@ -177,6 +177,8 @@ impl Assembly<'_> {
         }
         let mut loaded = crate::load::load_within(&model_source, &options, budget)?;
         loaded.facts.reading += reading;
+        // Which model an archive stands for is known when that is looked into.
+        loaded.facts.gaps |= model_source.path != path;
         // It was read where it really lies; a copy of the whole would still name that.
         let named = resolver.as_named(Path::new(&model.file));
         // What lies beside a model that is named by a link does not lie beside the link.

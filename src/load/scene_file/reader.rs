@@ -65,7 +65,7 @@ impl Faults {
         let Diagnostic { code, text, mut remedy, .. } = fault.diagnose(&self.file, "");
         // What else names files is a model.
         let text = text.replace("outside the model's folder", "outside the scene file's folder");
-        if matches!(fault, FileFault::Missing(_)) {
+        if fault.is_missing() {
             remedy = remedy.replace("the model", "the scene file");
         }
         self.note(code, &(at..at), text, remedy);

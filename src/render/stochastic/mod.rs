@@ -66,7 +66,7 @@ struct Sampler<'a> {
     fireflies: Option<&'a Fireflies>,
     /// First samples of each pixel that are traced before the picture, …
     first_samples: u32,
-    /// … and these, but for parts of a picture by themselves.
+    /// … and these, if they were kept: they are not where only what a picture takes is foretold.
     ahead: Option<&'a Ahead>,
     /// Samples of a pixel after each round.
     rounds: Vec<u32>,
@@ -90,7 +90,7 @@ impl<'a> Sampler<'a> {
     fn new(frame: &'a Frame, how: &'a Stochastic, output: Option<&'a Output>, context: &'a Context) -> Self {
         let judge = Certainty::of(frame, how, output, context.scene.background);
         let fireflies = context.fireflies.as_deref();
-        let ahead = context.ahead.as_deref().filter(|ahead| ahead.samples(frame.settings.seed) > 0);
+        let ahead = context.ahead.as_deref();
         let rounds = rounds(how, frame.settings, context.first_samples).collect();
         Self { frame, how, judge, fireflies, first_samples: context.first_samples, ahead, rounds }
     }
@@ -388,8 +388,8 @@ impl<'a> Sampler<'a> {
     }
 }
 
-/// Samples of a pixel after each round: the fewest, no fewer than `known`, but then at least [`SURE`], then twice as many from round to round,
-/// powers of two throughout, as these many points of the sequence lie most evenly.
+/// Samples of a pixel after each round: the fewest, no fewer than `known`, but then at least [`SURE`], then twice as many from
+/// round to round, powers of two throughout, as these many points of the sequence lie most evenly.
 fn rounds(how: &Stochastic, settings: &Settings, known: u32) -> impl Iterator<Item = u32> + use<> {
     let (fewest, most) = how.powers();
     // In a single row or column there are not enough pixels beside one.

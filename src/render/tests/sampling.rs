@@ -7,6 +7,7 @@ use crate::image::look::developed;
 use crate::image::{Output, Values, srgb};
 use crate::math::DQuat;
 use crate::render::context::Context;
+use crate::render::fireflies::{Closely, look};
 use crate::render::layers::empty;
 use crate::render::tile::{Alone, Tile, render_some};
 use crate::render::{
@@ -276,7 +277,13 @@ fn pixels_around_tiles_are_looked_at_only_where_that_can_decide_something() {
 
 #[test]
 fn a_tile_by_itself_is_what_it_is_among_others() {
-    let mut s = sharp();
+    for (mut s, known) in [(sharp(), 0), (soft(), 16)] {
+        is_the_same_by_itself(&mut s, known);
+    }
+}
+
+/// Tests it where so many samples of each pixel are known before the picture.
+fn is_the_same_by_itself(s: &mut Stage, known: u32) {
     (s.settings.width, s.settings.height, s.settings.layers) = (70, 40, true);
     for (min_samples, max_samples) in [(1, 64), (1, 2), (1, 1), (4, 16)] {
         s.settings.sampling = Sampling::Stochastic(Stochastic { min_samples, ..stochastic(0.08, max_samples) });
@@ -284,7 +291,10 @@ fn a_tile_by_itself_is_what_it_is_among_others() {
         let layers = whole.picture.layers.as_ref().expect("asked for");
         let tile = Tile { x0: 32, y0: 0, x1: 64, y1: 32 };
         let (pixels, rays) = s.with_job(AccelKind::None, |job| {
-            let context = Context::new(job.scene, job.world, job.textures, job.settings);
+            let mut context = Context::new(job.scene, job.world, job.textures, job.settings);
+            look::<RayCounts>(job, &mut context, Closely::All, &());
+            assert_eq!(context.first_samples, known.min(max_samples));
+            context.ahead = None;
             let (mut done, complete) =
                 render_some::<_, RayCounts>(&context, job.accel, job.view, job.settings, &(), &[tile]);
             assert!(complete);
@@ -292,6 +302,8 @@ fn a_tile_by_itself_is_what_it_is_among_others() {
             (pixels, counts.primary.queries)
         });
         assert_eq!(pixels.rays, rays);
+        let own: u32 = pixels.facts.iter().map(|facts| facts.count).sum();
+        assert_eq!(pixels.rays - pixels.rays_beyond - pixels.rays_around, u64::from(own));
         let mut alone = empty(70 * 40);
         for (k, (x, y)) in tile.places().enumerate() {
             let i = y as usize * 70 + x as usize;
