@@ -1,7 +1,7 @@
 //! Where the files of a model lie: on disk, or in the archive that it is read from.
 
 use super::lexical;
-use crate::load::archive::{Archive, in_archive, split};
+use crate::load::archive::{Archive, in_archive, opened, split};
 use crate::load::whole;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind};
@@ -76,8 +76,13 @@ impl Volume {
 
     /// The names of what lies in a folder.
     pub(super) fn names_in(&self, canonical: &Path) -> Vec<String> {
+        let listed = |archive: &Archive, name| archive.names_in(name).take(LISTED).map(str::to_owned).collect();
         if let Ok(Some((archive, name))) = self.within(canonical) {
-            return archive.names_in(name).take(LISTED).map(str::to_owned).collect();
+            return listed(&archive, name);
+        }
+        // An archive is a folder, too, where something in it is named.
+        if canonical.is_file() {
+            return opened(canonical).ok().flatten().map_or_else(Vec::new, |archive| listed(&archive, Path::new("")));
         }
         let entries = fs::read_dir(canonical).into_iter().flatten().take(LISTED).flatten();
         entries.filter_map(|entry| entry.file_name().into_string().ok()).collect()
