@@ -4,6 +4,7 @@
 //! became). A picture may come from a stranger, so only flags that shape pixels are taken from it: never names of
 //! outputs, folders or limits.
 
+use super::archives;
 use super::args::{Cli, Command, LoadArgs, RenderArgs};
 use super::camera::{Choice, LensChoice};
 use super::exit::Exit;
@@ -17,7 +18,7 @@ use super::stats::Counted;
 use crate::accel::auto::Reason;
 use crate::accel::{AccelKind, Assign, MailboxKind};
 use crate::image::{ExrSamples, FileKind, ImageError, Metadata, PngDepth, read_metadata};
-use crate::load::{Diagnostic, Loaded, MtlMode, Polygons, archive};
+use crate::load::{Diagnostic, Loaded, MtlMode, Polygons};
 use crate::math::DVec3;
 use crate::number::hash;
 use crate::render::Sampled;
@@ -360,11 +361,11 @@ fn repeat_from(metadata: Option<Metadata>, picture: &Path, typed: &RenderArgs) -
 /// whether it is the same.
 fn found(input: &str, picture: &Path) -> PathBuf {
     let (named, folder) = (PathBuf::from(input), picture.parent().unwrap_or(Path::new("")));
-    if input == "-" || archive::is_there(&named) {
+    if input == "-" || archives::is_there(&named) {
         return named;
     }
     let beside = named.file_name().map(|name| folder.join(name));
-    [Some(folder.join(&named)), beside].into_iter().flatten().find(|path| archive::is_there(path)).unwrap_or(named)
+    [Some(folder.join(&named)), beside].into_iter().flatten().find(|path| archives::is_there(path)).unwrap_or(named)
 }
 
 fn parse_settings(settings: &Map<String, Value>) -> Result<RenderArgs, String> {

@@ -4,6 +4,7 @@
 //! that was read. It is up to date if all are the same still, whatever the times of the files say. (Other pictures carry
 //! nothing of how they were asked for: there are several ways to ask for one.)
 
+use super::archives;
 use super::job::{Batch, RenderJob, Shot};
 use crate::image::{Metadata, read_metadata};
 use crate::load::Loaded;
@@ -92,7 +93,7 @@ static PROGRAM: LazyLock<String> = LazyLock::new(|| {
 });
 
 fn hash_of_file(path: &Path) -> io::Result<u128> {
-    let Ok(metadata) = path.metadata() else { return archive::read(path).map(|bytes| xxh3_128(&bytes)) };
+    let Ok(metadata) = path.metadata() else { return archives::read(path).map(|bytes| xxh3_128(&bytes)) };
     // Opening anything but a plain file could wait for ever.
     if !metadata.is_file() {
         return Err(io::ErrorKind::InvalidInput.into());

@@ -1,5 +1,6 @@
 //! What is to be done, checked: everything that can be known to be wrong before any work is told here.
 
+use super::archives::on_disk;
 use super::args::{AccelArgs, FileType, MessageFormat, RenderArgs, SpaceArg, StatsFormat};
 use super::camera::{self, Choice, LensChoice};
 use super::output_name::{Fields, Naming};
@@ -11,7 +12,6 @@ use super::{folders, message};
 use crate::accel::{AccelChoice, AccelKind, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::LoadOptions;
-use crate::load::archive::on_disk;
 use crate::render::{Cost, Instancing};
 use crate::scene::Background;
 use std::collections::HashSet;

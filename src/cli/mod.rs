@@ -5,6 +5,7 @@
 
 mod accident;
 mod again;
+mod archives;
 mod args;
 mod bench;
 mod camera;

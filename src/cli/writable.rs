@@ -1,5 +1,6 @@
 //! Whether a file may be written under a name: asked before any work is done for it.
 
+use super::archives;
 use super::output_name::{collision, identity};
 use super::outputs::Target;
 use crate::image::{destination, folder_takes, was_written_by_meshray};
@@ -26,7 +27,7 @@ impl Sources {
     pub(super) fn add(&self, files: impl IntoIterator<Item: AsRef<Path>>) {
         let named = files.into_iter().filter(|file| file.as_ref() != Path::new("-"));
         // Of what lies in an archive the archive is read.
-        let files: Vec<PathBuf> = named.map(|file| identity(archive::on_disk(file.as_ref()))).collect();
+        let files: Vec<PathBuf> = named.map(|file| identity(archives::on_disk(file.as_ref()))).collect();
         self.known().extend(files);
     }
 

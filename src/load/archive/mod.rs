@@ -9,10 +9,9 @@ mod model;
 mod opened;
 mod tests;
 
-pub use model::Offered;
-pub(crate) use model::is_called_an_archive;
+pub use model::{Offered, is_called_an_archive};
 pub(super) use model::{named_model, only_model, source, unreadable};
-pub(crate) use opened::{in_archive, is_there, on_disk, opened, read, split};
+pub(crate) use opened::{in_archive, opened, split};
 
 use super::Diagnostic;
 use super::detect::{ZIP, is_called_a_model, is_zipped_kind};

@@ -32,7 +32,7 @@ impl Offered<'_> {
 }
 
 /// Whether a file has the name of a zip archive.
-pub(crate) fn is_called_an_archive(path: &Path) -> bool {
+pub fn is_called_an_archive(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zip"))
 }
 

@@ -1,7 +1,6 @@
 //! Paths that lead into archives.
 
-use super::{Archive, ArchiveFault, is_archive_on_disk};
-use crate::load::limits::Limits;
+use super::{Archive, is_archive_on_disk};
 use std::fs::Metadata;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -49,11 +48,6 @@ pub(crate) fn split(path: &Path) -> Option<(&Path, &Path)> {
     (above.is_file() && above != path).then_some((above, rest))
 }
 
-/// The file on disk that is read for a path: the archive that it leads into, or what it names itself.
-pub(crate) fn on_disk(path: &Path) -> &Path {
-    split(path).map_or(path, |(above, _)| above)
-}
-
 /// The archive that a path leads into, and the path in it; `None` if it leads into none.
 ///
 /// # Errors
@@ -61,18 +55,4 @@ pub(crate) fn on_disk(path: &Path) -> &Path {
 pub(crate) fn in_archive(path: &Path) -> io::Result<Option<(Arc<Archive>, &Path)>> {
     let Some((above, rest)) = split(path) else { return Ok(None) };
     Ok(opened(above)?.map(|archive| (archive, rest)))
-}
-
-/// Whether there is such a file, on disk or in an archive.
-pub(crate) fn is_there(path: &Path) -> bool {
-    path.exists() || in_archive(path).is_ok_and(|found| found.is_some_and(|(archive, name)| archive.has(name)))
-}
-
-/// Unpacks a file in an archive, by its whole path.
-///
-/// # Errors
-/// Those of the system, and an [`ArchiveFault`] as the inner error of one.
-pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
-    let (archive, name) = in_archive(path)?.ok_or(ArchiveFault::None)?;
-    archive.read(name, Limits::default().file)
 }
