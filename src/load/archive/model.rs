@@ -37,8 +37,8 @@ pub fn is_called_an_archive(path: &Path) -> bool {
 }
 
 impl Archive {
-    /// The models in a folder of it and in those in that, in order, each in one format; what is hidden is none, nor what a Mac has
-    /// put beside each file.
+    /// The models in a folder of it and in those in that, in order, each in one format; what is hidden is none, nor what a Mac
+    /// has put beside each file.
     pub fn models(&self, folder: &Path) -> Vec<Offered<'_>> {
         let files = self.below(folder).filter(|name| is_shown(name) && is_called_a_model(Path::new(name)));
         let mut by_stem: BTreeMap<&str, Vec<&str>> = BTreeMap::new();

@@ -19,6 +19,7 @@ mod see_through;
 mod sight;
 mod soft;
 mod story;
+mod tiles;
 
 use super::texture::TextureStore;
 use super::view::{Lens, View};

@@ -1,15 +1,10 @@
 //! Adaptive and stochastic sampling: what they see, what they cost, and whether they keep what they promise.
 
 use super::*;
-use crate::accel::RayCounts;
 use crate::image::diff::{Space, compare};
 use crate::image::look::developed;
 use crate::image::{Output, Values, srgb};
 use crate::math::DQuat;
-use crate::render::context::Context;
-use crate::render::fireflies::{Closely, look};
-use crate::render::layers::empty;
-use crate::render::tile::{Alone, Tile, render_some};
 use crate::render::{
     Adaptive, ErrorSpace, Filter, Interval, Sampling, Split, Stochastic, ThinLens, render, render_costs,
     render_profiled, render_recorded,
@@ -21,7 +16,7 @@ fn adaptive(threshold: f32, levels: u32) -> Sampling {
     Sampling::Adaptive(Adaptive { threshold, levels, ..Adaptive::usual(Split::Corners) })
 }
 
-fn stochastic(error: f32, max_samples: u32) -> Stochastic {
+pub(super) fn stochastic(error: f32, max_samples: u32) -> Stochastic {
     Stochastic { error, max_samples, ..Stochastic::default() }
 }
 
@@ -34,7 +29,7 @@ fn edge(edge: f64) -> Stage {
 }
 
 /// Soft shadows, frosted glass and edges under a wide lamp, through a lens.
-fn soft() -> Stage {
+pub(super) fn soft() -> Stage {
     let mut s = stage(View::look_at(DVec3::new(0.5, 2.5, 5.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.7)));
     s.plane(DVec3::Y, -0.8, material(Vec3::new(0.6, 0.5, 0.4), phong()));
     s.sphere(DVec3::new(-0.7, 0.0, 0.0), 0.7, material(Vec3::new(0.2, 0.4, 0.7), phong()));
@@ -211,23 +206,6 @@ fn every_structure_and_number_of_threads_gives_the_same_bits_in_every_kind_of_sa
 }
 
 #[test]
-fn tiles_that_share_first_samples_have_the_same_bits_whoever_traces_these() {
-    let mut s = soft();
-    (s.settings.width, s.settings.height) = (130, 70);
-    s.settings.sampling = Sampling::Stochastic(stochastic(0.08, 16));
-    let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| s.render())
-    };
-    let one = with(1);
-    for threads in [2, 3, 7] {
-        let many = with(threads);
-        assert!(many.picture == one.picture && many.sampled == one.sampled, "{threads} threads");
-        assert_eq!(many.counts, one.counts, "{threads} threads");
-    }
-}
-
-#[test]
 fn layers_tell_how_certain_each_pixel_is_and_what_it_took() {
     let mut s = soft();
     (s.settings.width, s.settings.height, s.settings.layers) = (20, 15, true);
@@ -241,80 +219,6 @@ fn layers_tell_how_certain_each_pixel_is_and_what_it_took() {
     let all = rays + rendered.sampled.looked;
     assert_eq!((all, all), (rendered.sampled.rays, rendered.counts.primary.queries));
     assert!(rendered.sampled.errors.iter().any(|&e| e > 0.0));
-}
-
-/// The same without rays that are spread by chance, before which nobody looks what they meet.
-fn sharp() -> Stage {
-    let mut s = soft();
-    (s.settings.lens, s.settings.gloss_rays) = (None, None);
-    s
-}
-
-#[test]
-fn pixels_around_tiles_are_looked_at_only_where_that_can_decide_something() {
-    let mut s = sharp();
-    (s.settings.width, s.settings.height) = (40, 12);
-    let mut rays = |min_samples| {
-        s.settings.sampling = Sampling::Stochastic(Stochastic { min_samples, ..stochastic(0.1, 16) });
-        let sampled = s.render().sampled;
-        (sampled.rays - sampled.looked, sampled.counts.iter().map(|&n| u64::from(n)).sum::<u64>())
-    };
-    assert_eq!(rays(16), (40 * 12 * 16, 40 * 12 * 16));
-    // The two tiles meet in a line of twelve pixels: each looks at one row of the other's.
-    let (all, kept) = rays(4);
-    assert_eq!(all - kept, 2 * 12 * 4);
-    // Tiles tell each other what their first rays have met, so that only those that go on are traced twice.
-    let (all, kept) = rays(1);
-    // Were the first ones traced twice, too, it would be 48 more.
-    assert!((1..=2 * 12 * 3).contains(&(all - kept)), "{}", all - kept);
-    // What is known before is not traced for any tile.
-    let mut s = soft();
-    (s.settings.width, s.settings.height) = (40, 12);
-    s.settings.sampling = Sampling::Stochastic(stochastic(0.1, 16));
-    let sampled = s.render().sampled;
-    assert_eq!((sampled.rays - sampled.looked, sampled.samples()), (40 * 12 * 16, 16.0));
-}
-
-#[test]
-fn a_tile_by_itself_is_what_it_is_among_others() {
-    for (mut s, known) in [(sharp(), 0), (soft(), 16)] {
-        is_the_same_by_itself(&mut s, known);
-    }
-}
-
-/// Tests it where so many samples of each pixel are known before the picture.
-fn is_the_same_by_itself(s: &mut Stage, known: u32) {
-    (s.settings.width, s.settings.height, s.settings.layers) = (70, 40, true);
-    for (min_samples, max_samples) in [(1, 64), (1, 2), (1, 1), (4, 16)] {
-        s.settings.sampling = Sampling::Stochastic(Stochastic { min_samples, ..stochastic(0.08, max_samples) });
-        let whole = s.render();
-        let layers = whole.picture.layers.as_ref().expect("asked for");
-        let tile = Tile { x0: 32, y0: 0, x1: 64, y1: 32 };
-        let (pixels, rays) = s.with_job(AccelKind::None, |job| {
-            let mut context = Context::new(job.scene, job.world, job.textures, job.settings);
-            look::<RayCounts>(job, &mut context, Closely::All, &());
-            assert_eq!(context.first_samples, known.min(max_samples));
-            context.ahead = None;
-            let (mut done, complete) =
-                render_some::<_, RayCounts>(&context, job.accel, job.view, job.settings, &(), &[tile]);
-            assert!(complete);
-            let Alone { pixels, counts, .. } = done.remove(0);
-            (pixels, counts.primary.queries)
-        });
-        assert_eq!(pixels.rays, rays);
-        let own: u32 = pixels.facts.iter().map(|facts| facts.count).sum();
-        assert_eq!(pixels.rays - pixels.rays_beyond - pixels.rays_around, u64::from(own));
-        let mut alone = empty(70 * 40);
-        for (k, (x, y)) in tile.places().enumerate() {
-            let i = y as usize * 70 + x as usize;
-            assert_eq!(pixels.beauty[k], whole.picture.beauty[i], "{x} {y} of {max_samples}");
-            assert_eq!(pixels.facts[k].count, whole.sampled.counts[i], "{x} {y} of {max_samples}");
-            assert_eq!(pixels.facts[k].error, whole.sampled.errors[i], "{x} {y} of {max_samples}");
-            pixels.layers[k].store(&mut alone, i);
-            assert_eq!((alone.depth[i], alone.prim[i]), (layers.depth[i], layers.prim[i]), "{x} {y} of {max_samples}");
-            assert_eq!(alone.normal[i], layers.normal[i], "{x} {y} of {max_samples}");
-        }
-    }
 }
 
 #[test]
