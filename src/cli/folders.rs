@@ -146,7 +146,7 @@ impl Found {
     /// The models of an archive: one alone under the name of that.
     fn add_archive(&mut self, path: &Path) {
         match opened(path).and_then(|archive| archive.ok_or(ArchiveFault::None.into())) {
-            Ok(archive) if archive.models(Path::new("")).len() == 1 => self.models.push(path.into()),
+            Ok(archive) if archive.is_one_model() => self.models.push(path.into()),
             Ok(_) => _ = self.add_several(path),
             Err(error) => {
                 let told = match ArchiveFault::of(&error) {

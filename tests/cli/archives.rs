@@ -119,6 +119,16 @@ endsolid
 }
 
 #[test]
+fn an_archive_that_was_packed_once_more_is_drawn_under_the_name_of_the_outer_one() {
+    let inner = zip(&[("chair.obj", CUBE.as_bytes())]);
+    let folder = Folder::new().file("all/download.zip", zip(&[("source/chair.zip", &inner), ("read.me", b"")]));
+    folder.render(&["all", "-o", "thumbs/", "--update"]).ends(0).says(&["1 picture of 1 input, 0 up to date"]);
+    assert!(folder.has("thumbs/download.png"));
+    folder.render(&["all", "-o", "thumbs/", "--update"]).ends(0).says(&["0 pictures of 1 input, 1 up to date"]);
+    folder.run(&["inspect", "all/download.zip"]).ends(0).says(&[]);
+}
+
+#[test]
 fn an_archive_beside_a_folder_of_its_name_without_models_is_drawn() {
     let folder =
         Folder::new().file("all/chair.zip", zip(&[("chair.obj", CUBE.as_bytes())])).file("all/chair/a.png", "");

@@ -2,7 +2,8 @@
 //!
 //! What lies in an archive has the path of the archive and then its own: `ship.zip/textures/hull.png`. Archives are not
 //! trusted: only a directory of bounded size is read, names that lead out of the archive are none, a file is never larger
-//! than its entry says, and its checksum has to be right. What is an archive in an archive is a file like others.
+//! than its entry says, and its checksum has to be right. An archive in an archive is a file like others, unless it is all that
+//! could be the model.
 
 mod letters;
 mod model;

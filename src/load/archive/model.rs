@@ -56,13 +56,46 @@ impl Archive {
     }
 }
 
+impl Archive {
+    /// The only archive in one without models.
+    fn only_archive(&self) -> Option<&str> {
+        let mut inner = self.archives();
+        let only = inner.next().filter(|_| inner.next().is_none())?;
+        self.models(Path::new("")).is_empty().then_some(only)
+    }
+
+    /// Whether it stands for one model.
+    pub fn is_one_model(&self) -> bool {
+        self.only_archive().is_some() || self.models(Path::new("")).len() == 1
+    }
+
+    /// The archives in it.
+    fn archives(&self) -> impl Iterator<Item = &str> {
+        let names = self.entries.keys().map(String::as_str);
+        names.filter(|name| is_shown(name) && is_called_an_archive(Path::new(name)))
+    }
+}
+
 /// Whether a file in an archive is there for its users.
 fn is_shown(name: &str) -> bool {
     name.split('/').all(|part| !part.starts_with('.') && part != "__MACOSX")
 }
 
-/// The model of an archive: the only one there.
+/// The model of an archive: the only one there, or in the only archive that it has in place of models, as where what somebody
+/// once packed was packed with a licence.
 pub(in crate::load) fn only_model(archive: Arc<Archive>, limits: &Limits) -> Result<Source, LoadError> {
+    if let Some(inner) = archive.only_archive() {
+        let path = archive.path_of(inner);
+        let inner = source(archive.clone(), Path::new(inner), limits)?;
+        let inner = Archive::from_bytes(&path, inner.bytes).map_err(|error| unreadable(error, &path))?;
+        // No further: an archive may hold itself.
+        return model_of(Arc::new(inner), limits);
+    }
+    model_of(archive, limits)
+}
+
+/// The only model of an archive itself.
+fn model_of(archive: Arc<Archive>, limits: &Limits) -> Result<Source, LoadError> {
     let models = archive.models(Path::new(""));
     let [Offered { name, .. }] = &models[..] else { return Err(none_or_several(&archive, &models).into()) };
     let (name, note) = (PathBuf::from(name), models[0].note(&archive.path));
@@ -128,7 +161,7 @@ fn none_or_several(archive: &Archive, models: &[Offered]) -> Diagnostic {
             count if count > TOLD => format!("no model is in this archive: it has {held} and {} more", count - TOLD),
             _ => format!("no model is in this archive: it has {held}"),
         };
-        let remedy = match shown().find(|name| is_called_an_archive(Path::new(name))) {
+        let remedy = match archive.archives().next() {
             Some(inner) => format!("unpack it, and name '{}'", shorten(inner)),
             None => "meshray reads .glb, .gltf, .vrm, .obj, .ply, .stl and .nff files in it".into(),
         };

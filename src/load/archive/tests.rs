@@ -173,6 +173,23 @@ fn a_remark_behind_an_archive_may_look_like_the_end_of_one() {
 }
 
 #[test]
+fn an_archive_that_was_packed_once_more_is_looked_into_and_no_deeper() {
+    let inner = zip(&[("house.obj", OBJ.as_bytes()), ("paint.mtl", MTL)]);
+    let outer = zip(&[("source/house.zip", &inner), ("licence.txt", b"")]);
+    let loaded = load_bytes(Path::new("a.zip"), outer.clone(), &LoadOptions::default()).unwrap();
+    assert_eq!(names(&loaded), ["a.zip/source/house.zip/house.obj", "a.zip/source/house.zip/paint.mtl"]);
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    let (code, text) = fault(of_bytes(&[("once/more.zip", &outer)]));
+    assert!(code == "archive-empty" && text.contains("unpack it, and name 'source/house.zip'"), "{code}: {text}");
+    let (code, text) = fault(of_bytes(&[("a.zip", &inner), ("b.zip", &inner)]));
+    assert!(code == "archive-empty" && text.contains("unpack it, and name 'a.zip'"), "{code}: {text}");
+    let loaded = of_bytes(&[("old.zip", &inner), ("new.obj", OBJ.as_bytes())]).unwrap();
+    assert_eq!(names(&loaded), ["a.zip/new.obj"], "beside a model");
+    let spoiled = of_bytes(&[("source/house.zip", &inner[..50])]);
+    assert!(fault(spoiled).1.starts_with("archive-unreadable: a.zip/source/house.zip"));
+}
+
+#[test]
 fn archives_without_models_say_what_they_hold() {
     let (code, text) = fault(of_bytes(&[]));
     assert!(code == "archive-empty" && text.contains("no file is in this archive"), "{code}: {text}");
