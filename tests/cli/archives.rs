@@ -122,10 +122,10 @@ endsolid
 fn an_archive_that_was_packed_once_more_is_drawn_under_the_name_of_the_outer_one() {
     let inner = zip(&[("chair.obj", CUBE.as_bytes())]);
     let folder = Folder::new().file("all/download.zip", zip(&[("source/chair.zip", &inner), ("read.me", b"")]));
-    folder.render(&["all", "-o", "thumbs/", "--update"]).ends(0).says(&["1 picture of 1 input, 0 up to date"]);
+    folder.render(&["all", "-o", "thumbs/", "--update"]).ends(0);
     assert!(folder.has("thumbs/download.png"));
-    folder.render(&["all", "-o", "thumbs/", "--update"]).ends(0).says(&["0 pictures of 1 input, 1 up to date"]);
-    folder.run(&["inspect", "all/download.zip"]).ends(0).says(&[]);
+    folder.render(&["all", "-o", "thumbs/", "--update"]).ends(0).says(&["download.png: is up to date"]);
+    folder.run(&["inspect", "all/download.zip"]).ends(0);
 }
 
 #[test]
