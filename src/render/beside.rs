@@ -311,7 +311,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if reads {
             strip.read(context, traced, (mesh, placement), common);
         }
-        if common.lobes.is_none() {
+        if !common.is_completed() {
             strip.blur(traced, matter);
         }
         if shiny {
@@ -329,6 +329,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
         self.note_strip(traced, (instance, matter), strip);
         strip.complete(context, traced, (mesh, placement), common);
+        strip.overlay(context, traced, (mesh, placement), common);
         if !common.glass.is_some_and(|glass| glass.is_dark_inside && strip.sees_backs_alone()) {
             self.show(traced, common, strip);
         }
@@ -379,7 +380,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     fn show(&mut self, traced: Traced, common: &Common, strip: &mut Strip) {
         let (context, matter) = (self.context, &common.matter);
         let has_inside = common.has_inside();
-        if context.looks_around_by_points() || common.lobes.is_some() {
+        if context.looks_around_by_points() || common.is_completed() {
             self.each_point(traced, common, strip, |tracer, point| tracer.look_around(point));
         } else if !context.is_dark || matter.shines() {
             strip.look_around((matter, has_inside), &context.sky, context.scene.ambient);
@@ -472,7 +473,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let matter = match strip.whole(i) {
                 Some(whole) => whole,
                 None => {
-                    bare = ground.bare(&common.matter);
+                    bare = ground.covered(&common.matter);
                     &bare
                 }
             };

@@ -18,20 +18,32 @@ const F0: f32 = 0.04;
 #[derive(Clone, Debug)]
 pub(crate) struct CoatMatter {
     /// Share of the surface that it covers.
-    strength: f32,
-    roughness: f32,
+    pub strength: f32,
+    pub roughness: f32,
     /// Its own shading normal, on the viewer's side.
     pub normal: Vec3,
     /// Cosine of the view from it.
-    n_v: f32,
+    pub n_v: f32,
     /// Share of the light from below that it takes off.
-    taken: f32,
-    occlusion: f32,
+    pub taken: f32,
+    /// Share of the surroundings that is open to it.
+    pub occlusion: f32,
     /// α² of its highlights at least.
-    least_square: f32,
+    pub least_square: f32,
 }
 
 impl CoatMatter {
+    /// What covers nothing.
+    pub(crate) const NONE: Self = Self {
+        strength: 0.0,
+        roughness: 0.0,
+        normal: Vec3::Z,
+        n_v: 0.0,
+        taken: 0.0,
+        occlusion: 1.0,
+        least_square: 0.0,
+    };
+
     /// `None` where it covers nothing; `normal` is that of the lacquer.
     pub(super) fn new(coat: &Coat, normal: Vec3, view: Vec3, occlusion: f32, reader: &Reader) -> Option<Self> {
         let strength = (coat.strength * reader.linear(coat.strength_map.as_ref()).x).clamp(0.0, 1.0);
@@ -42,7 +54,8 @@ impl CoatMatter {
     }
 
     /// Share of what is below that is seen.
-    pub(super) fn clear(&self) -> f32 {
+    #[inline(always)]
+    pub(crate) fn clear(&self) -> f32 {
         1.0 - self.taken
     }
 
@@ -57,14 +70,16 @@ impl CoatMatter {
     }
 
     /// BRDF × N·L of a light; unit vectors, away from the surface.
-    pub(super) fn lit(&self, view: Vec3, to_light: Vec3) -> f32 {
+    #[inline(always)]
+    pub(crate) fn lit(&self, view: Vec3, to_light: Vec3) -> f32 {
         self.shown(view, to_light, squared_width(self.roughness).max(self.least_square))
     }
 
     /// The same for facets with a squared width of α².
+    #[inline(always)]
     fn shown(&self, view: Vec3, to_light: Vec3, a2: f32) -> f32 {
         let (n_l, n_v) = (self.normal.dot(to_light), self.normal.dot(view));
-        if n_l <= 0.0 || n_v <= 0.0 {
+        if self.strength <= 0.0 || n_l <= 0.0 || n_v <= 0.0 {
             return 0.0;
         }
         let between = view + to_light;
@@ -78,14 +93,30 @@ impl CoatMatter {
 
     /// What it shows of the surroundings without a ray.
     pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
-        let looked_up = 1.0 - traced(self.roughness);
-        if looked_up <= 0.0 {
+        if self.looked_up() <= 0.0 {
             return Vec3::ZERO;
         }
-        let mirrored = above(reflect(-seen.view, self.normal), seen.geometric);
-        let (scale, bias) = albedo(self.roughness, self.n_v);
+        let share = self.share_looked_up(albedo(self.roughness, self.n_v));
+        (sky.blurred(self.mirrored_from(seen), self.roughness) + ambient) * share
+    }
+
+    /// Share of what it mirrors that is looked up.
+    #[inline(always)]
+    pub(crate) fn looked_up(&self) -> f32 {
+        1.0 - traced(self.roughness)
+    }
+
+    /// Where that is looked for.
+    #[inline(always)]
+    pub(crate) fn mirrored_from(&self, seen: &Seen) -> Vec3 {
+        above(reflect(-seen.view, self.normal), seen.geometric)
+    }
+
+    /// Share of the light there that is seen; `scale` and `bias` are the shares of f0 and f90 in what its lobe sends back.
+    #[inline(always)]
+    pub(crate) fn share_looked_up(&self, (scale, bias): (f32, f32)) -> f32 {
         let share = self.strength * (F0 * scale + bias) * open(self.n_v, self.occlusion, self.roughness);
-        (sky.blurred(mirrored, self.roughness) + ambient) * (share * looked_up)
+        share * self.looked_up()
     }
 
     /// Weight of the mirror ray off it.
@@ -95,6 +126,7 @@ impl CoatMatter {
 }
 
 /// Reflectance at this cosine.
+#[inline(always)]
 fn fresnel(cosine: f32) -> f32 {
     fresnel_schlick(Vec3::splat(F0), 1.0, cosine).x
 }

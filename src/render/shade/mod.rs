@@ -219,19 +219,19 @@ impl Matter {
     #[cold]
     pub(crate) fn with_lobes(mut self, m: &MetalRough, on: &Footing, reader: &Reader) -> Self {
         let Model::MetalRough(core) = &mut self.model else { return self };
-        let n_v = on.normal.dot(on.view).clamp(0.0, 1.0);
         if let Some(film) = &m.film {
-            core.cover(film, n_v, reader);
+            core.cover(film, on.normal.dot(on.view).clamp(0.0, 1.0), reader);
         }
         self.grain = m.grain.as_ref().and_then(|grain| GrainMatter::new(grain, core.roughness(), on, reader));
         core.brush(self.grain.as_ref(), on.normal, on.view);
         let occlusion = core.paint().occlusion;
-        self.sheen = m.sheen.as_ref().and_then(|sheen| SheenMatter::new(sheen, n_v, reader));
-        if let Some(coat) = &m.coat {
-            let normal = on.coat_normal(coat.normal_map.as_ref(), coat.normal_scale, reader.store);
-            self.coat = CoatMatter::new(coat, normal, on.view, occlusion, reader);
-            self.emission *= self.below_coat();
-        }
+        self.under(overlays(m, on, occlusion, reader))
+    }
+
+    /// The same under these.
+    pub(crate) fn under(mut self, (sheen, coat): (Option<SheenMatter>, Option<CoatMatter>)) -> Self {
+        (self.sheen, self.coat) = (sheen, coat);
+        self.emission *= self.below_coat();
         self
     }
 
@@ -486,6 +486,22 @@ impl Matter {
         };
         Some(if ior > 0.0 { (ior, dispersion) } else { (1.0, 0.0) })
     }
+}
+
+/// Sheen and lacquer of a material at a point that sees such a share of its surroundings.
+pub(crate) fn overlays(
+    m: &MetalRough,
+    on: &Footing,
+    occlusion: f32,
+    reader: &Reader,
+) -> (Option<SheenMatter>, Option<CoatMatter>) {
+    let n_v = on.normal.dot(on.view).clamp(0.0, 1.0);
+    let sheen = m.sheen.as_ref().and_then(|sheen| SheenMatter::new(sheen, n_v, reader));
+    let coat = m.coat.as_ref().and_then(|coat| {
+        let normal = on.coat_normal(coat.normal_map.as_ref(), coat.normal_scale, reader.store);
+        CoatMatter::new(coat, normal, on.view, occlusion, reader)
+    });
+    (sheen, coat)
 }
 
 /// How rough what is seen along a path that rough surfaces have spread to this angle across, radians, is at least.

@@ -26,15 +26,18 @@ const LEAST_ROUGHNESS: f32 = 0.07;
 const WIDE: f32 = 0.5;
 
 /// The fibres at one point.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct SheenMatter {
-    color: Vec3,
-    roughness: f32,
+    pub color: Vec3,
+    pub roughness: f32,
     /// What all of them send back, seen from here.
-    albedo: f32,
+    pub albedo: f32,
 }
 
 impl SheenMatter {
+    /// No fibres.
+    pub(crate) const NONE: Self = Self { color: Vec3::ZERO, roughness: 1.0, albedo: 0.0 };
+
     /// `None` where there are none; `n_v` is the cosine of the view.
     pub(super) fn new(sheen: &Sheen, n_v: f32, reader: &Reader) -> Option<Self> {
         let color = (sheen.color * reader.srgb(sheen.color_map.as_ref())).clamp(Vec3::ZERO, Vec3::ONE);
@@ -43,12 +46,14 @@ impl SheenMatter {
     }
 
     /// Share of what is below that is seen.
-    pub(super) fn clear(&self) -> f32 {
+    #[inline(always)]
+    pub(crate) fn clear(&self) -> f32 {
         1.0 - self.color.max_element() * self.albedo
     }
 
     /// BRDF × N·L; unit vectors, away from the surface.
-    pub(super) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+    #[inline(always)]
+    pub(crate) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
         let (n_l, n_v) = (normal.dot(to_light), normal.dot(view));
         if n_l <= 0.0 || n_v <= 0.0 {
             return Vec3::ZERO;
@@ -59,12 +64,24 @@ impl SheenMatter {
 
     /// What it shows of the surroundings.
     pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
-        let around = sky.blurred(seen.mirrored(), self.roughness.max(WIDE)) + ambient;
-        self.color * self.albedo * around
+        self.around(sky.blurred(seen.mirrored(), Self::blur(self.roughness)) + ambient)
+    }
+
+    /// How rough a mirror would show the surroundings so blurred as fibres of this roughness do.
+    #[inline(always)]
+    pub(crate) fn blur(roughness: f32) -> f32 {
+        roughness.max(WIDE)
+    }
+
+    /// What it shows of so much light around the mirrored view.
+    #[inline(always)]
+    pub(crate) fn around(&self, light: Vec3) -> Vec3 {
+        self.color * self.albedo * light
     }
 }
 
 /// The lobe's parameter.
+#[inline(always)]
 fn alpha(roughness: f32) -> f32 {
     let r = roughness.max(LEAST_ROUGHNESS);
     r * r

@@ -1,6 +1,7 @@
 //! What the points of a strip show of their surroundings, and what they shine with themselves.
 
 use super::columns::{Column, Columns, Found, POINTS, Strip, get, padded, put};
+use super::overlays::Overlays;
 use super::painted::Painted;
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, LANES, Simd};
@@ -48,7 +49,8 @@ impl Strip {
     /// seen from inside.
     pub(crate) fn look_around(&mut self, (matter, has_inside): (&Matter, bool), sky: &Sky, ambient: Vec3) {
         let (found, painted, to, points) = (&self.found, &self.painted, &mut self.surroundings, padded(self.count));
-        self.level.run(Look { found, painted, to, points, matter, has_inside, sky, ambient });
+        let overlays = self.overlays.as_deref_mut().filter(|over| over.any());
+        self.level.run(Look { found, painted, overlays, to, points, matter, has_inside, sky, ambient });
         if let Some(weights) = &self.weights {
             self.level.run(Weigh { weights, radiance: &mut self.surroundings.radiance, points });
         }
@@ -84,6 +86,7 @@ impl Kernel for Weigh<'_> {
 struct Look<'a> {
     found: &'a Found,
     painted: &'a Painted,
+    overlays: Option<&'a mut Overlays>,
     to: &'a mut Surroundings,
     points: usize,
     matter: &'a Matter,
@@ -98,7 +101,7 @@ impl Kernel for Look<'_> {
     // Whether maps change the material is asked outside the loops, which then are formulas.
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { found, painted, to, points, matter, has_inside, sky, ambient } = self;
+        let Self { found, painted, overlays, to, points, matter, has_inside, sky, ambient } = self;
         let (points, emission) = (points.min(POINTS), matter.emission);
         match &matter.model {
             Model::Unlit(_) if painted.any => {
@@ -115,19 +118,25 @@ impl Kernel for Look<'_> {
                 }
             }
             Model::MetalRough(m) if painted.any => {
-                let mapped = Mapped { m: *m, painted };
-                if has_inside {
-                    look(s, &mapped, (found, |i| found.front[i] == 1), to, points, (sky, ambient));
+                let (mapped, emission) = (Mapped { m: *m, painted }, |i| painted.emission(i));
+                if let Some(overlays) = overlays {
+                    look(s, &mapped, (found, |_| true), to, points, (sky, ambient), |_| Vec3::ZERO);
+                    overlays.show(s, found, to, points, (sky, ambient), emission);
+                } else if has_inside {
+                    look(s, &mapped, (found, |i| found.front[i] == 1), to, points, (sky, ambient), emission);
                 } else {
-                    look(s, &mapped, (found, |_| true), to, points, (sky, ambient));
+                    look(s, &mapped, (found, |_| true), to, points, (sky, ambient), emission);
                 }
             }
             Model::MetalRough(m) => {
-                let even = Even { m: m.in_the_open(), row: m.shares(), mean: mean_albedo(m.roughness()), emission };
-                if has_inside {
-                    look(s, &even, (found, |i| found.front[i] == 1), to, points, (sky, ambient));
+                let even = Even { m: m.in_the_open(), row: m.shares(), mean: mean_albedo(m.roughness()) };
+                if let Some(overlays) = overlays {
+                    look(s, &even, (found, |_| true), to, points, (sky, ambient), |_| Vec3::ZERO);
+                    overlays.show(s, found, to, points, (sky, ambient), |_| emission);
+                } else if has_inside {
+                    look(s, &even, (found, |i| found.front[i] == 1), to, points, (sky, ambient), |_| emission);
                 } else {
-                    look(s, &even, (found, |_| true), to, points, (sky, ambient));
+                    look(s, &even, (found, |_| true), to, points, (sky, ambient), |_| emission);
                 }
             }
         }
@@ -146,7 +155,6 @@ fn scatter(to: &mut Surroundings, points: usize, ambient: Vec3, matter: impl Fn(
 /// A metallic-rough material at each point.
 trait MetalRoughPoints {
     fn matter(&self, i: usize) -> MetalRoughMatter;
-    fn emission(&self, i: usize) -> Vec3;
     /// Finds the shares of f0 and f90 in what its lobe sends back where the cosines of the view are these.
     fn find_shares<S: Simd>(&self, s: S, points: usize, n_v: &Column, to: &mut [Column; 2]);
     /// Finds the means over the hemisphere of what white lobes send back, where they differ.
@@ -164,18 +172,12 @@ struct Even {
     m: MetalRoughMatter,
     row: AlbedoRow,
     mean: f32,
-    emission: Vec3,
 }
 
 impl MetalRoughPoints for Even {
     #[inline(always)]
     fn matter(&self, _: usize) -> MetalRoughMatter {
         self.m
-    }
-
-    #[inline(always)]
-    fn emission(&self, _: usize) -> Vec3 {
-        self.emission
     }
 
     #[inline(always)]
@@ -218,11 +220,6 @@ impl MetalRoughPoints for Mapped<'_> {
     }
 
     #[inline(always)]
-    fn emission(&self, i: usize) -> Vec3 {
-        self.painted.emission(i)
-    }
-
-    #[inline(always)]
     fn find_shares<S: Simd>(&self, s: S, points: usize, n_v: &Column, [scale, bias]: &mut [Column; 2]) {
         let at = self.painted.roughness.as_chunks().0.iter().zip(n_v.as_chunks().0);
         let eights = scale.as_chunks_mut().0.iter_mut().zip(bias.as_chunks_mut().0);
@@ -254,7 +251,7 @@ impl MetalRoughPoints for Mapped<'_> {
     }
 }
 
-/// What a metallic-rough material shows; `outside` tells whether a point is seen from outside.
+/// What a metallic-rough material shows, with its emission; `outside` tells whether a point is seen from outside.
 #[inline(always)]
 fn look<S: Simd>(
     s: S,
@@ -263,6 +260,7 @@ fn look<S: Simd>(
     to: &mut Surroundings,
     points: usize,
     (sky, ambient): (&Sky, Vec3),
+    emission: impl Fn(usize) -> Vec3,
 ) {
     for i in 0..points.min(POINTS) {
         let seen = found.seen(i);
@@ -296,7 +294,7 @@ fn look<S: Simd>(
             turned_back: 0.0,
         };
         let matter = m.matter(i);
-        put(&mut to.radiance, i, m.emission(i) + matter.around(&around, matter.rebound(m.mean_albedo(&to.mean, i))).0);
+        put(&mut to.radiance, i, emission(i) + matter.around(&around, matter.rebound(m.mean_albedo(&to.mean, i))).0);
     }
 }
 
@@ -320,7 +318,7 @@ fn spread(sky: &Sky, normals: &Columns, points: usize, to: &mut Columns) {
 
 /// Mean light around these mirrored directions, as far as the roughness says.
 #[inline(always)]
-fn blur(sky: &Sky, roughness: impl Fn(usize) -> f32, dirs: &Columns, points: usize, to: &mut Columns) {
+pub(super) fn blur(sky: &Sky, roughness: impl Fn(usize) -> f32, dirs: &Columns, points: usize, to: &mut Columns) {
     match sky.studio() {
         Some(UpAxis::Y) => {
             for i in 0..points.min(POINTS) {

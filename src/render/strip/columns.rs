@@ -4,6 +4,7 @@ use super::around::Surroundings;
 use super::cones::Cones;
 use super::faces::Faces;
 use super::lit::Lit;
+use super::overlays::Overlays;
 use super::painted::Painted;
 use super::sheet::{LOBE_MAPS, LobeTexels};
 use super::sorted::Sorted;
@@ -71,8 +72,10 @@ pub(crate) struct Strip {
     pub(super) surroundings: Surroundings,
     pub(super) lit: Lit,
     pub(super) drawn: Drawn,
-    /// The whole matter of each point, where it has more lobes or maps of its reflectance; else empty.
+    /// The whole matter of each point, where more changes it than columns know; else empty.
     pub(super) whole: Vec<Matter>,
+    /// What lies over each point, where that is all there is more; kept from one strip to the next.
+    pub(super) overlays: Option<Box<Overlays>>,
 }
 
 /// What hits say.
@@ -135,6 +138,7 @@ impl Default for Strip {
             lit: Lit::default(),
             drawn: Drawn::default(),
             whole: Vec::new(),
+            overlays: None,
         }
     }
 }
@@ -155,6 +159,7 @@ impl Strip {
         }
         self.weights = None;
         self.whole.clear();
+        self.overlays.iter_mut().for_each(|overlays| overlays.clear());
         if traced.has_weights() {
             let weights = self.weights.insert(EMPTY);
             for (i, &ray) in self.rays[..self.count].iter().enumerate() {

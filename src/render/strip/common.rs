@@ -40,6 +40,8 @@ pub(crate) struct Lobes {
     pub reads_maps: bool,
     /// Whether maps say how much it reflects.
     pub reads_reflectance: bool,
+    /// Whether they are sheen and lacquer alone, which leave what is under them as it is.
+    pub are_overlays: bool,
 }
 
 /// What is known of a material that lets light in.
@@ -96,6 +98,11 @@ impl Common {
         self.glass.is_some() || self.lobes.is_some() || self.spreads
     }
 
+    /// Whether what its points are made of is found point by point.
+    pub(crate) fn is_completed(&self) -> bool {
+        self.lobes.is_some_and(|lobes| !lobes.are_overlays)
+    }
+
     /// Whether backs of faces are seen from inside.
     pub(crate) fn has_inside(&self) -> bool {
         self.glass.is_some_and(|glass| glass.has_inside)
@@ -108,10 +115,12 @@ impl Lobes {
         let reads_maps = other_maps(m) > 0;
         let reads_mesh = m.grain.is_some() || m.coat.as_ref().is_some_and(|coat| coat.normal_map.is_some());
         let reads_reflectance = reads_reflectance(m);
+        let changes_core = m.grain.is_some() || m.film.is_some() || m.translucence.is_some() || reads_reflectance;
         (m.has_lobes() || m.translucence.is_some() || reads_maps).then_some(Self {
             reads_mesh,
             reads_maps,
             reads_reflectance,
+            are_overlays: !changes_core && m.transmission <= 0.0,
         })
     }
 }

@@ -83,8 +83,8 @@ impl Strip {
         self.level.run(Print { found, cones, points: padded(count) });
     }
 
-    /// Finds how far a surface bends where cones meet it, and how wide highlights must be, unless points have lobes that find
-    /// that themselves; `placement` where the mesh has normals of its own.
+    /// Finds how far a surface bends where cones meet it, and how wide highlights must be, unless that is found when points are
+    /// completed; `placement` where the mesh has normals of its own.
     pub(crate) fn bend(&mut self, context: &Context, common: &Common, placement: Option<&Placement>) {
         let matter = &common.matter;
         let Self { cones, painted, given, found, .. } = self;
@@ -93,7 +93,7 @@ impl Strip {
             Some(placement) => self.level.run(Bend { given, found, cones, points, placement }),
             None => cones.bend.fill(0.0),
         }
-        if !context.lights.is_empty() && common.lobes.is_none() {
+        if !context.lights.is_empty() && !common.is_completed() {
             self.level.run(WidenHighlights { painted, cones, points, matter, reach });
         }
     }

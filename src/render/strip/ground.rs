@@ -62,9 +62,13 @@ impl Strip {
 }
 
 impl StripPoint<'_> {
-    /// The material there, which is `even` where maps do not change it, but for its lobes.
-    pub(crate) fn bare(&self, even: &Matter) -> Matter {
-        self.strip.bare(self.i, even, self.outside)
+    /// The material there, which is `even` where maps do not change it, under what lies over it.
+    pub(crate) fn covered(&self, even: &Matter) -> Matter {
+        let bare = self.strip.bare(self.i, even, self.outside);
+        match self.strip.overlays.as_ref().filter(|over| over.any()) {
+            Some(over) => bare.under(over.at(self.i)),
+            None => bare,
+        }
     }
 }
 

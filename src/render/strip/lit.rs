@@ -3,6 +3,7 @@
 use super::around::Weigh;
 use super::columns::{Column, Columns, Found, LANES, POINTS, Strip, get, leave, padded, put};
 use super::cones::Cones;
+use super::overlays::Overlays;
 use super::painted::Painted;
 use super::wide::Drawn;
 use crate::accel::Ray;
@@ -25,9 +26,9 @@ const GRAZING: u32 = 2;
 pub(super) struct Lit {
     /// [`PLAIN`] or [`GRAZING`] where it is seen, else 0.
     pub seen: [u32; POINTS],
-    to_light: Columns,
+    pub to_light: Columns,
     /// Its strength, or irradiance, as the model wants it.
-    light: Columns,
+    pub light: Columns,
     pub radiance: Columns,
     /// The shadow ray.
     pub origin: Columns,
@@ -62,6 +63,7 @@ impl Strip {
     ) {
         let (found, lit, points) = (&self.found, &mut self.lit, padded(self.count));
         let (painted, whole) = (&self.painted, &self.whole);
+        let overlays = self.overlays.as_deref().filter(|over| over.any());
         let cones = shiny.then_some(&self.cones);
         let drawn = place.map(|place| (&mut self.drawn, place));
         match drawn {
@@ -72,6 +74,7 @@ impl Strip {
                 matter,
                 painted,
                 whole,
+                overlays,
                 cones,
                 has_inside,
                 light,
@@ -84,6 +87,7 @@ impl Strip {
                 matter,
                 painted,
                 whole,
+                overlays,
                 cones,
                 has_inside,
                 light,
@@ -213,8 +217,10 @@ struct Shine<'a, const WIDE: bool> {
     points: usize,
     matter: &'a Matter,
     painted: &'a Painted,
-    /// What points with more lobes are made of.
+    /// What points are made of that more changes than columns know.
     whole: &'a [Matter],
+    /// What lies over points.
+    overlays: Option<&'a Overlays>,
     /// Where highlights may be narrow.
     cones: Option<&'a Cones>,
     has_inside: bool,
@@ -228,7 +234,7 @@ impl<const WIDE: bool> Kernel for Shine<'_, WIDE> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { found, lit, points, matter, painted, whole, cones, has_inside, light, mut drawn } = self;
+        let Self { found, lit, points, matter, painted, whole, overlays, cones, has_inside, light, mut drawn } = self;
         let (points, light) = (points.min(POINTS), *light);
         let in_lux = matches!(matter.model, Model::MetalRough(_));
         debug_assert_eq!(WIDE, drawn.is_some());
@@ -266,6 +272,21 @@ impl<const WIDE: bool> Kernel for Shine<'_, WIDE> {
             Model::MetalRough(m) => {
                 let m = *m;
                 match (painted.any, cones) {
+                    // What has overlays always has cones.
+                    (any, Some(cones)) if overlays.is_some() => {
+                        let least_square = &cones.least_square;
+                        if any {
+                            reflect_below(found, lit, points, |i, normal, view, to_light| {
+                                painted.metal_rough(i, &m).at_least(least_square[i]).lit(normal, view, to_light)
+                            });
+                        } else {
+                            reflect_below(found, lit, points, |i, normal, view, to_light| {
+                                m.at_least(least_square[i]).lit(normal, view, to_light)
+                            });
+                        }
+                        overlays.into_iter().for_each(|overlays| overlays.reflect(found, lit, points));
+                        keep_all(found, lit, points);
+                    }
                     (true, Some(cones)) if has_inside => reflect(found, lit, points, |i, normal, view, to_light| {
                         let m = painted.metal_rough(i, &m).at_least(cones.least_square[i]);
                         m.lit_on_side(normal, view, to_light, found.front[i] == 1)
@@ -334,6 +355,26 @@ fn keep(found: &Found, lit: &mut Lit, i: usize, (radiance, counts): (Vec3, bool)
     let how = if grazes { GRAZING } else { PLAIN };
     lit.seen[i] *= if seen { how } else { 0 };
     put(&mut lit.radiance, i, radiance);
+}
+
+/// What the points under overlays reflect of the light that arrives.
+#[inline(always)]
+fn reflect_below(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(usize, Vec3, Vec3, Vec3) -> Vec3) {
+    for i in 0..points.min(POINTS) {
+        let (normal, view, to_light) = (get(&found.normal, i), get(&found.view, i), get(&lit.to_light, i));
+        let radiance = share(i, normal, view, to_light) * get(&lit.light, i);
+        put(&mut lit.radiance, i, radiance);
+    }
+}
+
+/// Keeps what all points show of light that arrives from above.
+#[inline(always)]
+fn keep_all(found: &Found, lit: &mut Lit, points: usize) {
+    for i in 0..points.min(POINTS) {
+        let above = get(&found.horizon, i).dot(get(&lit.to_light, i)) > 0.0;
+        let radiance = get(&lit.radiance, i);
+        keep(found, lit, i, (radiance, above), above);
+    }
 }
 
 /// What points with more lobes reflect of the light that arrives, and what they let through.

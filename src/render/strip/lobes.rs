@@ -1,9 +1,9 @@
 //! Points with more lobes than that of their facets, those of a grain, film, sheen or lacquer, with maps of their reflectance, or
 //! that scatter light to their other side: where they are and how they are seen is found side by side, what they are
-//! made of one by one.
+//! made of one by one, unless all their lobes are [overlays](super::overlays).
 
 use super::columns::{POINTS, Strip, get};
-use super::common::Common;
+use super::common::{Common, Lobes};
 use super::sheet::Sheet;
 use crate::accel::NO_PRIM;
 use crate::math::{Vec3, Vec4};
@@ -12,7 +12,7 @@ use crate::render::context::Context;
 use crate::render::footing::Footing;
 use crate::render::glint;
 use crate::render::patch::Patch;
-use crate::render::shade::{Known, Matter, Reader};
+use crate::render::shade::{CoatMatter, Known, Matter, Reader};
 use crate::render::surface::{Target, side_of};
 use crate::render::whitted::SPREAD;
 use crate::render::world::Placement;
@@ -29,24 +29,47 @@ impl Strip {
         common: &Common,
     ) {
         let metal_rough = context.scene.materials[mesh.material as usize].metal_rough();
-        let (Some(m), Some(lobes)) = (metal_rough, common.lobes) else { return };
+        let (Some(m), Some(lobes)) = (metal_rough, common.lobes.filter(|lobes| !lobes.are_overlays)) else { return };
+        let mut whole = std::mem::take(&mut self.whole);
+        self.each_footing(context, traced, (mesh, placement), (common, lobes), |i, on, reader| {
+            let outside = self.found.front[i] == 1 || !common.has_inside();
+            let bare = self.bare(i, &common.matter, outside);
+            let Some(on) = on else { return whole.push(bare) };
+            let below = if lobes.reads_reflectance { bare.tinted(m, reader) } else { bare };
+            let below = below.thinned(m, reader);
+            let mut matter = if outside { below.with_lobes(m, on, reader) } else { below };
+            let scattered = traced.path(self.rays[i] as usize).scattered;
+            if scattered > SPREAD {
+                matter.blur(scattered);
+            }
+            self.widen_highlights(i, context, m, &mut matter, on.patch);
+            whole.push(matter);
+        });
+        self.whole = whole;
+    }
+
+    /// Tells of each point what its lobes lie on, or nothing where the tracer must look itself, with what reads their maps.
+    pub(super) fn each_footing(
+        &self,
+        context: &Context,
+        traced: Traced,
+        (mesh, placement): (&Mesh, &Placement),
+        (common, lobes): (&Common, Lobes),
+        mut tell: impl FnMut(usize, Option<&Footing>, &Reader),
+    ) {
         let by_sheet = common.sheet.as_ref().filter(|sheet| sheet.covers(mesh)).map_or(&[][..], Sheet::lobes);
         let unread = |&(map, space): &_| Known { map, space, texel: Vec4::ONE };
         let mut known: Vec<Known> = by_sheet.iter().map(unread).collect();
         let reads_mesh = lobes.reads_mesh || lobes.reads_maps && known.is_empty();
         let placement = (!mesh.normals.is_empty()).then_some(placement);
-        let mut whole = std::mem::take(&mut self.whole);
         let (mut prim, mut patch) = (NO_PRIM, None);
         for i in 0..self.count.min(POINTS) {
-            let outside = self.found.front[i] == 1 || !common.has_inside();
-            let bare = self.bare(i, &common.matter, outside);
             if self.found.certain[i] != 1 {
-                whole.push(bare);
+                tell(i, None, &Reader { store: context.textures, patch: None, known: &[] });
                 continue;
             }
-            let at = self.rays[i] as usize;
             if reads_mesh {
-                let hit = &traced.hits()[at];
+                let hit = &traced.hits()[self.rays[i] as usize];
                 if prim != hit.prim {
                     prim = hit.prim;
                     patch =
@@ -58,18 +81,8 @@ impl Strip {
             }
             known.iter_mut().zip(&*self.of_lobes).for_each(|(known, texels)| known.texel = texels[i]);
             let reader = Reader { store: context.textures, patch: patch.as_ref(), known: &known };
-            let below = if lobes.reads_reflectance { bare.tinted(m, &reader) } else { bare };
-            let below = below.thinned(m, &reader);
-            let mut matter =
-                if outside { below.with_lobes(m, &self.footing(i, placement, patch.as_ref()), &reader) } else { below };
-            let scattered = traced.path(at).scattered;
-            if scattered > SPREAD {
-                matter.blur(scattered);
-            }
-            self.widen_highlights(i, context, m, &mut matter, patch.as_ref());
-            whole.push(matter);
+            tell(i, Some(&self.footing(i, placement, patch.as_ref())), &reader);
         }
-        self.whole = whole;
     }
 
     /// What point `i` is made of with all its lobes, if it has more than one.
@@ -97,17 +110,35 @@ impl Strip {
         if context.lights.is_empty() {
             return;
         }
-        let (reach, cones) = (context.highlight_reach, &self.cones);
-        let of_mesh = cones.bend[i] * (reach * reach);
-        let least = |of_map: f32| glint::least_of(of_mesh + of_map, cones.spread[i], reach);
         if matter.has_narrow_highlight() {
-            matter.widen_highlight(least(cones.turning[i]));
+            matter.widen_highlight(self.least_square(i, context, self.cones.turning[i]));
         }
-        if let Some(coat) = matter.coat.as_mut().filter(|coat| coat.has_narrow_highlight()) {
-            let map = m.coat.as_ref().and_then(|coat| Some((coat.normal_map.as_ref()?, coat.normal_scale)));
-            let turning =
-                |(patch, (map, scale)): (&Patch, _)| patch.turning_of_map(map, scale, context.textures, reach);
-            coat.widen_highlight(least(patch.zip(map).map_or(0.0, turning)));
+        if let Some(coat) = &mut matter.coat {
+            self.widen_coat(i, context, m, coat, patch);
         }
+    }
+
+    /// The same of highlights of lacquer alone.
+    pub(super) fn widen_coat(
+        &self,
+        i: usize,
+        context: &Context,
+        m: &MetalRough,
+        coat: &mut CoatMatter,
+        patch: Option<&Patch>,
+    ) {
+        if context.lights.is_empty() || !coat.has_narrow_highlight() {
+            return;
+        }
+        let map = m.coat.as_ref().and_then(|coat| Some((coat.normal_map.as_ref()?, coat.normal_scale)));
+        let reach = context.highlight_reach;
+        let turning = |(patch, (map, scale)): (&Patch, _)| patch.turning_of_map(map, scale, context.textures, reach);
+        coat.widen_highlight(self.least_square(i, context, patch.zip(map).map_or(0.0, turning)));
+    }
+
+    /// α² of narrow highlights at point `i` at least, where a normal map turns the surface by angles of such squares.
+    fn least_square(&self, i: usize, context: &Context, turning: f32) -> f32 {
+        let (reach, cones) = (context.highlight_reach, &self.cones);
+        glint::least_of(cones.bend[i] * (reach * reach) + turning, cones.spread[i], reach)
     }
 }

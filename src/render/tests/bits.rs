@@ -411,6 +411,58 @@ fn lobes_shaded_side_by_side_have_the_bits_of_lobes_shaded_one_by_one() {
     }
 }
 
+/// The same with sheen and lacquer alone over what is metallic-rough, one or both, smooth and rough, their maps of so many
+/// textures.
+fn overlaid(mut s: Stage, textures: u32) -> Stage {
+    let map = |i: usize, texture: u32| {
+        let transform = UvTransform { scale: Vec2::new(1.0 + i as f32, 1.0), ..UvTransform::default() };
+        (textures > 0).then(|| TextureRef { texture: texture % textures, uv_set: (i % 2) as u32, transform })
+    };
+    let matters = s.scene.materials.iter_mut().filter_map(|material| match &mut material.reflection {
+        Reflection::MetalRough(m) => Some(m),
+        Reflection::Phong(_) | Reflection::Unlit => None,
+    });
+    for (i, m) in matters.enumerate() {
+        (m.specular_map, m.specular_color_map) = (None, None);
+        m.coat = (i % 3 != 0).then(|| {
+            let (strength_map, normal_map) = (map(i, 0), map(i, 2).filter(|_| i % 2 == 0));
+            let (roughness, roughness_map) = ([0.04, 0.3, 0.7][i % 3], map(i, 1).filter(|_| i % 4 != 1));
+            Box::new(Coat { strength: 0.8, strength_map, roughness, roughness_map, normal_map, normal_scale: 0.6 })
+        });
+        m.sheen = (i % 3 != 1).then(|| {
+            let (color_map, roughness_map) = (map(i, 1), map(i, 2));
+            Box::new(Sheen { color: Vec3::new(0.5, 0.9, 0.0), color_map, roughness: 0.7, roughness_map })
+        });
+    }
+    s
+}
+
+#[test]
+fn sheen_and_lacquer_over_points_side_by_side_have_the_bits_of_those_over_points_one_by_one() {
+    let cases = [
+        (Environment::Studio, 0, 1, None),
+        (Environment::Studio, 3, 1, None),
+        (Environment::Black, 3, 1, None),
+        (Environment::Constant(Vec3::splat(0.2)), 3, 0, None),
+        (Environment::Studio, 3, 3, Some(2)),
+    ];
+    for (environment, textures, depth, env_rays) in cases {
+        let mut s = overlaid(if textures > 0 { painted() } else { plain() }, textures);
+        for light in &mut s.scene.lights {
+            light.size = if depth > 1 { 0.2 } else { 0.0 };
+        }
+        s.scene.ambient = Vec3::new(0.1, 0.0, 0.05);
+        (s.settings.depth, s.settings.env_rays, s.scene.environment) = (Some(depth), env_rays, environment);
+        let store = TextureStore::new(&s.scene);
+        let are_overlays = |m: &&Material| {
+            let common = Common::of((0, m), &store, true, Gloss::new(None));
+            common.and_then(|common| common.lobes).is_some_and(|lobes| lobes.are_overlays)
+        };
+        assert!(s.scene.materials.iter().filter(are_overlays).count() >= 4, "nothing would be compared");
+        same_one_by_one(&mut s, &format!("{textures} textures, depth {depth}"));
+    }
+}
+
 #[test]
 fn rough_surfaces_that_spread_rays_have_the_same_bits_side_by_side() {
     for (textures, depth) in [(0, 2), (3, 1), (3, 3)] {
