@@ -12,7 +12,7 @@ use std::process::{Command, ExitCode};
 use std::sync::Arc;
 
 use meshray::accel::{
-    Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, NO_PRIM, NoProbe, Ray, RayOrder, Shapes, Splitting, Wide,
+    Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, NO_PRIM, NoProbe, Ray, Shapes, Splitting, TraceMode, Wide,
 };
 use meshray::generate::Family;
 use meshray::math::random::Random;
@@ -39,8 +39,8 @@ const RAYS: usize = 4096;
 const NARROW: f32 = 0.125;
 
 const LEVELS: [&str; 2] = ["portable", "AVX2"];
-const WAYS: [(RayOrder, &str); 3] =
-    [(RayOrder::OneByOne, "one-by-one"), (RayOrder::InFlight, "in-flight"), (RayOrder::Packets, "packets")];
+const WAYS: [(TraceMode, &str); 3] =
+    [(TraceMode::OneByOne, "one-by-one"), (TraceMode::InFlight, "in-flight"), (TraceMode::Packets, "packets")];
 const RUNS: [&str; 2] = ["alike", "apart"];
 const QUESTIONS: [&str; 2] = ["first", "any"];
 

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use meshray::accel::{AccelChoice, AccelParams, Kept, NO_PRIM, Pencil, RayOrder, Splitting, Wide, auto};
+use meshray::accel::{AccelChoice, AccelParams, InstancedObjects, NO_PRIM, Pencil, Splitting, TraceMode, Wide, auto};
 use meshray::bench::clock::{Spread, processor_seconds};
 use meshray::math::simd::Level;
 
@@ -41,11 +41,11 @@ libembree4";
 /// Rays handed to a program at once.
 const SLICE: usize = 4096;
 
-const KERNELS: [(RayOrder, &str); 4] = [
-    (RayOrder::OneByOne, "ray by ray"),
-    (RayOrder::InFlight, "in flight"),
-    (RayOrder::Packets, "packets of 16 or 32"),
-    (RayOrder::Adaptive, "as it chooses"),
+const KERNELS: [(TraceMode, &str); 4] = [
+    (TraceMode::OneByOne, "ray by ray"),
+    (TraceMode::InFlight, "in flight"),
+    (TraceMode::Packets, "packets of 16 or 32"),
+    (TraceMode::Adaptive, "as it chooses"),
 ];
 
 const MESHES: [&str; 5] = ["rocker", "bunny", "stadium", "hall", "mountain"];
@@ -145,7 +145,7 @@ fn compare(mesh: &Mesh, embree: Option<&Embree>, words: &Words) -> bool {
         rays[0].len(),
         rays[1].len()
     );
-    println!("auto takes {}", auto::reason(shapes, &Kept::default(), u64::MAX));
+    println!("auto takes {}", auto::reason(shapes, &InstancedObjects::default(), u64::MAX));
 
     if words.only.is_empty() {
         builds(mesh, embree, words.passes);

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use meshray::accel::{Accel, Hit, Looking, NO_PRIM, NoProbe, Ray, Shapes, Splitting, Wide};
+use meshray::accel::{Accel, Hit, HitQueries, NO_PRIM, NoProbe, Ray, Shapes, Splitting, Wide};
 
 use crate::tracer::{Answer, Rays, Tracer};
 
@@ -55,8 +55,8 @@ impl Tracer for Ours<'_> {
             }
         } else {
             hits.resize(rays.len(), Hit::MISS);
-            let looking = Looking { pencil: pencil.as_ref(), ..Looking::along(rays) };
-            self.wide.look(&looking, hits, scratch, &mut NoProbe);
+            let queries = HitQueries { pencil: pencil.as_ref(), ..HitQueries::along(rays) };
+            self.wide.first_hits(&queries, hits, scratch, &mut NoProbe);
             for (answer, hit) in answers.iter_mut().zip(hits) {
                 *answer = Answer { prim: hit.prim, t: hit.t };
             }

@@ -4,10 +4,10 @@ use std::any::Any;
 
 use super::intersector::{IntersectorKind, Looked, MollerTrumbore, MollerTrumboreDouble, Watertight, WatertightDouble};
 use super::query::{Culling, Tested};
-use super::volumes::{Ball, Volumes};
+use super::volumes::{BoundingSphere, Volumes};
 use super::{
-    Accel, AccelParams, Bvh, GridOctree, Hit, Holes, Kept, Looking, NoProbe, Probe, Ray, Shapes, Splitting,
-    StructureStats, Transformed, TwoLevel, Unculled, Wide,
+    Accel, AccelParams, Bvh, GridOctree, Hit, HitQueries, InstancedObjects, NoProbe, OccludedFilter, Probe, Ray,
+    Shapes, Splitting, StructureStats, Transformed, TwoLevel, Unculled, Wide,
 };
 use crate::math::aabb::Aabb;
 use crate::named::names;
@@ -111,7 +111,7 @@ pub struct AnyAccel<'a> {
 enum Structure<'a> {
     None(Unculled<'a>),
     Transform(Transformed<'a>),
-    Spheres(Volumes<'a, Ball>),
+    Spheres(Volumes<'a, BoundingSphere>),
     Boxes(Volumes<'a, Aabb>),
     Bvh(Bvh<'a>),
     Grid(GridOctree<'a>),
@@ -174,18 +174,23 @@ impl<'a> AnyAccel<'a> {
         Self { kind, structure, test: IntersectorKind::Exact }
     }
 
-    /// Builds a structure over `shapes` and what is `kept`, where anything is; for kinds that can
+    /// Builds a structure over `shapes` and what is `instanced`, where anything is; for kinds that can
     /// ([`AccelKind::keeps_instances`]), others give way to the default. Asked with the exact test, and with no other where
-    /// anything is kept.
-    pub fn build_with(kind: AccelKind, shapes: &'a Shapes, kept: &'a Kept, params: &AccelParams) -> Self {
-        if kept.is_empty() {
+    /// anything is instanced.
+    pub fn build_with(
+        kind: AccelKind,
+        shapes: &'a Shapes,
+        instanced: &'a InstancedObjects,
+        params: &AccelParams,
+    ) -> Self {
+        if instanced.is_empty() {
             return Self::build(kind, shapes, params);
         }
         let (kind, splitting) = match kind {
             AccelKind::FastBvh => (kind, Splitting::SurfaceArea),
             _ => (AccelKind::FastOctree, Splitting::Octree),
         };
-        let structure = Structure::TwoLevel(TwoLevel::build(shapes, kept, splitting));
+        let structure = Structure::TwoLevel(TwoLevel::build(shapes, instanced, splitting));
         Self { kind, structure, test: IntersectorKind::Exact }
     }
 
@@ -268,35 +273,35 @@ impl Accel for AnyAccel<'_> {
 
     // All that are silent share what is compiled for one.
 
-    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
-        let after = looking.after.map_or(hits.len(), <[Hit]>::len);
-        assert_eq!([after, hits.len()], [looking.rays.len(); 2], "a hit before and after for each ray");
+    fn first_hits<P: Probe>(&self, queries: &HitQueries, hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
+        let after = queries.after.map_or(hits.len(), <[Hit]>::len);
+        assert_eq!([after, hits.len()], [queries.rays.len(); 2], "a hit before and after for each ray");
         if P::SILENT {
-            self.ask(Looks { looking, hits, probe: &mut NoProbe }, scratch);
+            self.ask(Looks { queries, hits, probe: &mut NoProbe }, scratch);
         } else {
-            self.ask(Looks { looking, hits, probe }, scratch);
+            self.ask(Looks { queries, hits, probe }, scratch);
         }
     }
 
-    fn blocked<P: Probe>(
+    fn occluded_filtered<P: Probe>(
         &self,
         rays: &[Ray],
-        holes: Option<&dyn Holes>,
+        filter: Option<&dyn OccludedFilter>,
         blocked: &mut [bool],
         scratch: &mut AnyScratch,
         probe: &mut P,
     ) {
         assert_eq!(rays.len(), blocked.len(), "a verdict for each ray");
         if P::SILENT {
-            self.ask(Blocked { rays, holes, blocked, probe: &mut NoProbe }, scratch);
+            self.ask(Blocked { rays, filter, blocked, probe: &mut NoProbe }, scratch);
         } else {
-            self.ask(Blocked { rays, holes, blocked, probe }, scratch);
+            self.ask(Blocked { rays, filter, blocked, probe }, scratch);
         }
     }
 }
 
 struct Looks<'q, P> {
-    looking: &'q Looking<'q>,
+    queries: &'q HitQueries<'q>,
     hits: &'q mut [Hit],
     probe: &'q mut P,
 }
@@ -305,13 +310,13 @@ impl<P: Probe> Question for Looks<'_, P> {
     const SILENT: bool = P::SILENT;
 
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
-        accel.look(self.looking, self.hits, scratch, self.probe);
+        accel.first_hits(self.queries, self.hits, scratch, self.probe);
     }
 }
 
 struct Blocked<'q, P> {
     rays: &'q [Ray],
-    holes: Option<&'q dyn Holes>,
+    filter: Option<&'q dyn OccludedFilter>,
     blocked: &'q mut [bool],
     probe: &'q mut P,
 }
@@ -320,6 +325,6 @@ impl<P: Probe> Question for Blocked<'_, P> {
     const SILENT: bool = P::SILENT;
 
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
-        accel.blocked(self.rays, self.holes, self.blocked, scratch, self.probe);
+        accel.occluded_filtered(self.rays, self.filter, self.blocked, scratch, self.probe);
     }
 }

@@ -24,7 +24,9 @@ use std::str::FromStr;
 use super::instances::Object;
 use super::shapes::Prim;
 use super::wide::ALIKE;
-use super::{Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, Kept, Ray, RayCounts, Shapes, Splitting, Wide};
+use super::{
+    Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, InstancedObjects, Ray, RayCounts, Shapes, Splitting, Wide,
+};
 use crate::math::Vec3;
 use crate::math::random::Random;
 use crate::math::triangle;
@@ -202,30 +204,30 @@ fn build_for<'a>(
     (AnyAccel::build(reason.kind, shapes, params), Some(reason))
 }
 
-/// The same over `shapes` and what is `kept`, for so many eye rays: the larger one of both, shapes or objects, is the one that
+/// The same over `shapes` and what is `instanced`, for so many eye rays: the larger one of both, shapes or objects, is the one that
 /// is judged.
 pub fn build_with<'a>(
     eye_rays: u64,
     choice: AccelChoice,
-    (shapes, kept): (&'a Shapes, &'a Kept),
+    (shapes, instanced): (&'a Shapes, &'a InstancedObjects),
     params: &AccelParams,
 ) -> (AnyAccel<'a>, Option<Reason>) {
-    if kept.is_empty() {
+    if instanced.is_empty() {
         return build_for(eye_rays, choice, shapes, params);
     }
     let (kind, reason) = match choice {
         AccelChoice::Kind(kind) => (kind, None),
         AccelChoice::Auto => {
-            let reason = reason(shapes, kept, eye_rays);
+            let reason = reason(shapes, instanced, eye_rays);
             (reason.kind, Some(reason))
         }
     };
-    (AnyAccel::build_with(kind, shapes, kept, params), reason)
+    (AnyAccel::build_with(kind, shapes, instanced, params), reason)
 }
 
 /// What [`build_with`] would choose, and why, by the largest of what it builds trees over.
-pub fn reason(shapes: &Shapes, kept: &Kept, eye_rays: u64) -> Reason {
-    let objects = kept.objects().iter().map(Object::shapes);
+pub fn reason(shapes: &Shapes, instanced: &InstancedObjects, eye_rays: u64) -> Reason {
+    let objects = instanced.objects().iter().map(Object::shapes);
     let largest = objects.fold(shapes, |a, b| if b.bounded() >= a.bounded() { b } else { a });
     judge(largest, eye_rays)
 }

@@ -15,14 +15,15 @@
 pub mod any;
 pub mod auto;
 pub mod bvh;
+mod filter;
 pub mod grid;
-mod holes;
 pub mod instances;
 pub mod intersector;
 pub mod none;
 pub mod params;
 pub mod probe;
 pub mod query;
+pub mod query_batch;
 pub mod refine;
 pub mod shapes;
 pub mod slabs;
@@ -31,28 +32,27 @@ pub mod stats;
 pub(crate) mod tests;
 pub mod transform;
 pub mod volumes;
-pub mod wave;
 pub mod wide;
 
 pub use any::{AccelKind, AnyAccel};
 pub use auto::AccelChoice;
 pub use bvh::Bvh;
+pub use filter::{HitQueries, IntersectFilter, OccludedFilter};
 pub use grid::mailbox::MailboxKind;
 pub use grid::{Assign, GridOctree, GridParams};
-pub use holes::{Gaps, Holes, Looking};
-pub use instances::{Kept, TwoLevel};
+pub use instances::{InstancedObjects, TwoLevel};
 pub use intersector::{Intersector, IntersectorKind};
 pub use none::Unculled;
 pub use params::AccelParams;
 pub use probe::{Count, NoProbe, Probe, RayCounts};
 pub use query::Tested;
+pub use query_batch::Pencil;
 pub use refine::Refined;
 pub use shapes::{BitSet, Object, Shapes, SpherePrim};
 pub use stats::StructureStats;
 pub use transform::Transformed;
 pub use volumes::Volumes;
-pub use wave::Pencil;
-pub use wide::{Listed, RayOrder, Splitting, Wide};
+pub use wide::{Listed, Splitting, TraceMode, Wide};
 
 use bytemuck::{Pod, Zeroable};
 
@@ -175,20 +175,20 @@ pub trait Accel: Sync {
 
     /// The first hit of each ray in `t_min..=t_max`, or the first there that comes after another in the order (t, prim), but for
     /// hits with what is known to be gaps: some of these may be passed, or none. [`Hit::MISS`] where there is none.
-    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P);
+    fn first_hits<P: Probe>(&self, queries: &HitQueries, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P);
 
     /// Whether anything *opaque* lies in `t_min..=t_max` of each ray: prims with a bit in [`Shapes::opaque`]. In a
     /// scene, faces of masked, blended and transmissive materials are opaque only where their maps let nothing through;
     /// whether anything at all lies there says [`Self::closest`].
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P) {
-        self.blocked(rays, None, blocked, scratch, probe);
+        self.occluded_filtered(rays, None, blocked, scratch, probe);
     }
 
-    /// The same, and whether any other prim is in the way that stops light where a ray meets it, as `holes` knows.
-    fn blocked<P: Probe>(
+    /// [`Self::occluded`], and whether any other prim is in the way that stops light where a ray meets it, as `filter` decides.
+    fn occluded_filtered<P: Probe>(
         &self,
         rays: &[Ray],
-        holes: Option<&dyn Holes>,
+        filter: Option<&dyn OccludedFilter>,
         blocked: &mut [bool],
         scratch: &mut Self::Scratch,
         probe: &mut P,
@@ -196,7 +196,7 @@ pub trait Accel: Sync {
 
     /// The first hit of each ray in `t_min..=t_max`; [`Hit::MISS`] where there is none.
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        self.look(&Looking::along(rays), hits, scratch, probe);
+        self.first_hits(&HitQueries::along(rays), hits, scratch, probe);
     }
 
     /// The first hit of each ray in `t_min..=t_max` that comes after `after` in the order (t, prim). All hits are found one
@@ -209,6 +209,6 @@ pub trait Accel: Sync {
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        self.look(&Looking { after: Some(after), ..Looking::along(rays) }, hits, scratch, probe);
+        self.first_hits(&HitQueries { after: Some(after), ..HitQueries::along(rays) }, hits, scratch, probe);
     }
 }

@@ -50,7 +50,7 @@ pub trait Probe: Default + Send {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Visit {
     /// Which one.
-    pub place: Place,
+    pub place: NodeId,
     /// The room it takes, in the frame of the shapes.
     pub extent: Extent,
     /// Prims listed in it; `None` where it leads to other nodes.
@@ -59,7 +59,7 @@ pub struct Visit {
 
 /// A node or cell by its place in its structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum NodeId {
     /// A cell of a grid, by column, row and layer.
     Cell([u32; 3]),
     /// A node of an octree in a cell: its least corner and the logarithm of its side, in the finest cells there can be.
@@ -74,11 +74,11 @@ pub enum Place {
     Block(u32),
     /// A leaf of other prims.
     Run(u32),
-    /// A node of the hierarchy over the places where kept objects stand.
+    /// A node of the hierarchy over the places where instanced objects stand.
     Places(u32),
-    /// A node of the tree of a kept object: the first prim of the object where it stands, and the node.
+    /// A node of the tree of an instanced object: the first prim of the object where it stands, and the node.
     PlacedNode(u32, u32),
-    /// A block of triangles of a kept object, likewise.
+    /// A block of triangles of an instanced object, likewise.
     PlacedBlock(u32, u32),
     /// The volume around an object.
     Object(u32),
@@ -208,7 +208,7 @@ pub enum Count {
     Bit,
     /// Tests saved by the mailbox.
     Mb,
-    /// Points transformed into the ray's axes, or corners of a kept instance to where it stands.
+    /// Points transformed into the ray's axes, or corners of an instanced object to where it stands.
     Xf,
 }
 

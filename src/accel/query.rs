@@ -5,8 +5,8 @@
 
 use super::intersector::{Exact, Intersector};
 use super::probe::{Outcome, Test};
-use super::wave::{ForAny, ForFirst, ForNext, Wave, begin, end};
-use super::{Accel, Gaps, Hit, Holes, Looking, NO_PRIM, Probe, Ray, Shapes};
+use super::query_batch::{ClosestBatch, NextBatch, OccludedBatch, QueryBatch, begin, end};
+use super::{Accel, Hit, HitQueries, IntersectFilter, NO_PRIM, OccludedFilter, Probe, Ray, Shapes};
 use crate::math::shear::RaySpace;
 use crate::math::simd::LANES;
 use crate::math::triangle::{self, Meeting, Triangle};
@@ -27,7 +27,7 @@ pub trait Culling: Sync {
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, scratch: &mut Self::Scratch, probe: &mut P);
 
     /// Answers a wave, one ray after another unless a structure knows better.
-    fn trace<W: Wave, P: Probe>(&self, wave: &mut W, scratch: &mut Self::Scratch, probe: &mut P) {
+    fn trace<W: QueryBatch, P: Probe>(&self, wave: &mut W, scratch: &mut Self::Scratch, probe: &mut P) {
         for i in 0..wave.rays().len() {
             let (mut query, usable) = begin(self.shapes(), wave, i, probe);
             if usable && !query.test_planes(probe) && self.shapes().bounded() > 0 {
@@ -63,7 +63,7 @@ pub trait Goal {
 
     /// Who knows where prims that are not opaque are not there, if anybody is asked, and the ray's number there.
     #[inline(always)]
-    fn gaps(&self) -> Option<(&dyn Gaps, usize)> {
+    fn filter(&self) -> Option<(&dyn IntersectFilter, usize)> {
         None
     }
 
@@ -189,11 +189,11 @@ impl<'a, G: Goal> Query<'a, G> {
         }
     }
 
-    /// Whether a hit that would be the answer is one with a gap.
+    /// Whether the filter rejects a hit that would be the answer.
     #[inline]
     fn passes(&self, t: f32, prim: u32) -> bool {
-        let Some((gaps, ray)) = self.goal.gaps() else { return false };
-        !self.is_opaque(prim) && self.goal.is_nearer(t, prim) && gaps.is_gap(ray, prim)
+        let Some((filter, ray)) = self.goal.filter() else { return false };
+        !self.is_opaque(prim) && self.goal.is_nearer(t, prim) && filter.rejects(ray, prim)
     }
 
     /// Whether a prim stops light wherever it is met.
@@ -338,8 +338,8 @@ impl<'a, G: Goal> Query<'a, G> {
 /// The first hit.
 pub struct Closest<'w, I> {
     best: (f32, u32),
-    /// Who knows of gaps, if anybody does, and the ray's number there.
-    gaps: Option<&'w dyn Gaps>,
+    /// The filter of hits, if there is one, and the ray's number in its batch.
+    filter: Option<&'w dyn IntersectFilter>,
     ray: usize,
     test: I,
 }
@@ -348,8 +348,8 @@ impl<I: Intersector> Goal for Closest<'_, I> {
     type Test = I;
 
     #[inline(always)]
-    fn gaps(&self) -> Option<(&dyn Gaps, usize)> {
-        Some((self.gaps?, self.ray))
+    fn filter(&self) -> Option<(&dyn IntersectFilter, usize)> {
+        Some((self.filter?, self.ray))
     }
     #[inline]
     fn is_nearer(&self, t: f32, prim: u32) -> bool {
@@ -381,7 +381,7 @@ impl<I: Intersector> Goal for Closest<'_, I> {
 pub struct Occluded<'w, I> {
     pub(super) found: bool,
     /// Who knows of prims that are not opaque, and the ray's number there.
-    holes: Option<&'w dyn Holes>,
+    filter: Option<&'w dyn OccludedFilter>,
     ray: usize,
     test: I,
 }
@@ -392,11 +392,11 @@ impl<I: Intersector> Goal for Occluded<'_, I> {
 
     #[inline]
     fn wants_open(&self) -> bool {
-        self.holes.is_some()
+        self.filter.is_some()
     }
     #[inline(always)]
     fn minds(&self, opaque: bool, prim: u32) -> bool {
-        opaque || self.holes.is_some_and(|holes| holes.stops(self.ray, prim))
+        opaque || self.filter.is_some_and(|filter| filter.stops(self.ray, prim))
     }
     #[inline]
     fn is_nearer(&self, _t: f32, _prim: u32) -> bool {
@@ -431,8 +431,8 @@ impl<I: Intersector> Goal for Next<'_, I> {
     type Test = I;
 
     #[inline(always)]
-    fn gaps(&self) -> Option<(&dyn Gaps, usize)> {
-        self.closest.gaps()
+    fn filter(&self) -> Option<(&dyn IntersectFilter, usize)> {
+        self.closest.filter()
     }
     #[inline]
     fn is_nearer(&self, t: f32, prim: u32) -> bool {
@@ -463,21 +463,21 @@ impl<'w, I> Closest<'w, I> {
 
     /// The first hit, if it comes before one that is known.
     pub(super) fn before(known: &Hit, test: I) -> Self {
-        Self { best: (known.t, known.prim), gaps: None, ray: 0, test }
+        Self { best: (known.t, known.prim), filter: None, ray: 0, test }
     }
 
-    /// The same of the ray of this number, which passes gaps, if anybody knows of any.
+    /// The goal of the ray of this number in its batch, whose hits `filter` may reject.
     #[inline(always)]
-    pub(super) fn passing(self, gaps: Option<&'w dyn Gaps>, ray: usize) -> Self {
-        Self { gaps, ray, ..self }
+    pub(super) fn passing(self, filter: Option<&'w dyn IntersectFilter>, ray: usize) -> Self {
+        Self { filter, ray, ..self }
     }
 }
 
 impl<'w, I> Occluded<'w, I> {
     /// Nothing yet, of the ray of this number.
     #[inline(always)]
-    pub(super) fn by(holes: Option<&'w dyn Holes>, ray: usize, test: I) -> Self {
-        Self { found: false, holes, ray, test }
+    pub(super) fn by(filter: Option<&'w dyn OccludedFilter>, ray: usize, test: I) -> Self {
+        Self { found: false, filter, ray, test }
     }
 }
 
@@ -495,25 +495,27 @@ impl<C: Culling> Accel for C {
         self.new_scratch()
     }
 
-    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        let Looking { rays, pencil, after, gaps } = *looking;
+    fn first_hits<P: Probe>(&self, queries: &HitQueries, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
+        let HitQueries { rays, pencil, after, filter } = *queries;
         match after {
-            Some(after) => self.trace(&mut ForNext { rays, after, gaps, hits, test: Exact }, scratch, probe),
-            None => {
-                self.trace(&mut ForFirst { rays, pencil: pencil.copied(), gaps, hits, test: Exact }, scratch, probe)
-            }
+            Some(after) => self.trace(&mut NextBatch { rays, after, filter, hits, test: Exact }, scratch, probe),
+            None => self.trace(
+                &mut ClosestBatch { rays, pencil: pencil.copied(), filter, hits, test: Exact },
+                scratch,
+                probe,
+            ),
         }
     }
 
-    fn blocked<P: Probe>(
+    fn occluded_filtered<P: Probe>(
         &self,
         rays: &[Ray],
-        holes: Option<&dyn Holes>,
+        filter: Option<&dyn OccludedFilter>,
         blocked: &mut [bool],
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        self.trace(&mut ForAny { rays, holes, blocked, test: Exact }, scratch, probe);
+        self.trace(&mut OccludedBatch { rays, filter, blocked, test: Exact }, scratch, probe);
     }
 }
 
@@ -538,23 +540,23 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
         self.structure.new_scratch()
     }
 
-    // Pencils and gaps are for the exact test.
-    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        let (Looking { rays, after, .. }, gaps, test) = (*looking, None, self.test);
+    // Pencils and filters are for the exact test.
+    fn first_hits<P: Probe>(&self, queries: &HitQueries, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
+        let (HitQueries { rays, after, .. }, filter, test) = (*queries, None, self.test);
         match after {
-            Some(after) => self.structure.trace(&mut ForNext { rays, after, gaps, hits, test }, scratch, probe),
-            None => self.structure.trace(&mut ForFirst { rays, pencil: None, gaps, hits, test }, scratch, probe),
+            Some(after) => self.structure.trace(&mut NextBatch { rays, after, filter, hits, test }, scratch, probe),
+            None => self.structure.trace(&mut ClosestBatch { rays, pencil: None, filter, hits, test }, scratch, probe),
         }
     }
 
-    fn blocked<P: Probe>(
+    fn occluded_filtered<P: Probe>(
         &self,
         rays: &[Ray],
-        holes: Option<&dyn Holes>,
+        filter: Option<&dyn OccludedFilter>,
         blocked: &mut [bool],
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        self.structure.trace(&mut ForAny { rays, holes, blocked, test: self.test }, scratch, probe);
+        self.structure.trace(&mut OccludedBatch { rays, filter, blocked, test: self.test }, scratch, probe);
     }
 }

@@ -58,10 +58,10 @@ impl Prim<'_> {
     /// Position, error bound, normal and weights of a hit with this prim that a query found on `ray`.
     pub fn refine(&self, ray: &Ray, hit: &Hit) -> Refined {
         if let Prim::Triangle(corners) = self {
-            let facet = Facet::of(corners);
-            let (position, error, certain) = facet.place(ray.origin, ray.dir, (hit.u, hit.v));
+            let plane = TrianglePlane::of(corners);
+            let (position, error, certain) = plane.place(ray.origin, ray.dir, (hit.u, hit.v));
             if certain {
-                return Refined { position, start: position, error, normal: facet.flat.unit(), u: hit.u, v: hit.v };
+                return Refined { position, start: position, error, normal: plane.flat.unit(), u: hit.u, v: hit.v };
             }
         }
         self.refine_with_care(ray, hit)
@@ -111,12 +111,12 @@ impl Prim<'_> {
 
 /// What hits on one triangle share when they are refined.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Facet {
+pub(crate) struct TrianglePlane {
     pub flat: Flat,
     pub rim: Rim,
 }
 
-impl Facet {
+impl TrianglePlane {
     pub(crate) fn of(triangle: &Triangle) -> Self {
         let corners = triangle::in_f64(triangle);
         let flat = Flat::of(corners);
@@ -187,7 +187,7 @@ mod tests {
             let ray = Ray::new(origin, dir);
             let hit = Hit { t: 1.0, u, v, prim: 0 };
             assert_eq!(shapes.refine(&ray, &hit), shapes.prim(hit.prim).refine_with_care(&ray, &hit));
-            placed += usize::from(Facet::of(&shapes.triangle(0)).place(origin, dir, (u, v)).2);
+            placed += usize::from(TrianglePlane::of(&shapes.triangle(0)).place(origin, dir, (u, v)).2);
         }
         assert!((1900..2300).contains(&placed), "{placed}");
     }

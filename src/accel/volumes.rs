@@ -5,9 +5,9 @@
 //! but the volume around all of it.
 //!
 //! # Why no hit is lost
-//! Volumes hold all points of their prims: boxes are made of the prims' own bounds, and see [`Ball`].
+//! Volumes hold all points of their prims: boxes are made of the prims' own bounds, and see [`BoundingSphere`].
 
-use super::probe::{Extent, Place, Visit};
+use super::probe::{Extent, NodeId, Visit};
 use super::query::{Culling, Goal, Query};
 use super::shapes::{Object, Prim};
 use super::slabs::{BoxRay, limit, start};
@@ -94,7 +94,7 @@ impl<V: Volume> Culling for Volumes<'_, V> {
                 continue;
             }
             probe.step();
-            probe.visit(|| Visit { place: Place::Object(i), extent: volume.extent(), listed: Some(object.len()) });
+            probe.visit(|| Visit { place: NodeId::Object(i), extent: volume.extent(), listed: Some(object.len()) });
             probe.cell(false);
             for prim in object.prims() {
                 if query.test(prim, probe) {
@@ -131,7 +131,7 @@ impl Volume for Aabb {
 
 /// A bounding sphere around the middle of the prims' box.
 #[derive(Clone, Copy, Debug)]
-pub struct Ball {
+pub struct BoundingSphere {
     center: DVec3,
     radius: f64,
 }
@@ -152,7 +152,7 @@ pub struct BallRay {
     from: f64,
 }
 
-impl Volume for Ball {
+impl Volume for BoundingSphere {
     type Ray = BallRay;
 
     fn around(shapes: &Shapes, prims: impl Iterator<Item = u32> + Clone) -> Self {

@@ -2,7 +2,7 @@
 
 use super::clock::timed;
 use super::rays::Batch;
-use crate::accel::{Accel, Hit, Holes, NoProbe, Probe, Ray, RayCounts};
+use crate::accel::{Accel, Hit, NoProbe, OccludedFilter, Probe, Ray, RayCounts};
 use crate::render::{Filters, Noted, Question};
 use crate::threads;
 use std::thread;
@@ -119,9 +119,9 @@ impl<'a, A: Accel> Asking<'a, A> {
         match slice.question {
             Question::Closest => self.accel.closest(slice.rays, hits, &mut self.scratch, probe),
             Question::Occluded => {
-                let holes = self.filters.map(|filters| filters.before(slice.rays, &mut self.noted));
-                let holes = holes.as_ref().map(|holes| holes as &dyn Holes);
-                self.accel.blocked(slice.rays, holes, blocked, &mut self.scratch, probe);
+                let filter = self.filters.map(|filters| filters.before(slice.rays, &mut self.noted));
+                let filter = filter.as_ref().map(|filter| filter as &dyn OccludedFilter);
+                self.accel.occluded_filtered(slice.rays, filter, blocked, &mut self.scratch, probe);
             }
             Question::Next => self.accel.next(slice.rays, slice.after, hits, &mut self.scratch, probe),
         }

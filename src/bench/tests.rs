@@ -8,7 +8,7 @@ use super::rays::{Class, RaySet, record};
 use super::report::{Format, Model, Rays, Report, text};
 use super::row::Row;
 use crate::accel::{
-    Accel, AccelKind, AccelParams, AnyAccel, Count, Hit, Holes, Looking, Probe, Ray, RayCounts, Unculled,
+    Accel, AccelKind, AccelParams, AnyAccel, Count, Hit, HitQueries, OccludedFilter, Probe, Ray, RayCounts, Unculled,
 };
 use crate::load::{LoadOptions, load_bytes};
 use crate::render::texture::TextureStore;
@@ -150,20 +150,20 @@ impl Accel for Blind<'_> {
 
     fn scratch(&self) {}
 
-    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut (), probe: &mut P) {
-        self.0.look(looking, hits, scratch, probe);
+    fn first_hits<P: Probe>(&self, queries: &HitQueries, hits: &mut [Hit], scratch: &mut (), probe: &mut P) {
+        self.0.first_hits(queries, hits, scratch, probe);
         hits.iter_mut().filter(|h| h.prim == self.1).for_each(|h| *h = Hit::MISS);
     }
 
-    fn blocked<P: Probe>(
+    fn occluded_filtered<P: Probe>(
         &self,
         rays: &[Ray],
-        holes: Option<&dyn Holes>,
+        filter: Option<&dyn OccludedFilter>,
         blocked: &mut [bool],
         scratch: &mut (),
         probe: &mut P,
     ) {
-        self.0.blocked(rays, holes, blocked, scratch, probe);
+        self.0.occluded_filtered(rays, filter, blocked, scratch, probe);
     }
 }
 

@@ -172,7 +172,7 @@ impl PictureStats {
         let samples = (settings.sampling == Sampling::Uniform).then_some(settings.samples);
         let sampling = sampling::json(settings, making.sampled);
         let (scene, shapes) = (&making.loaded.scene, &world.shapes);
-        let kept_vertices: usize = world.kept.objects().iter().map(|o| o.shapes().vertices.len()).sum();
+        let kept_vertices: usize = world.instanced.objects().iter().map(|o| o.shapes().vertices.len()).sum();
         // Every corner is looked at, which is not done for pictures without statistics.
         let rounding = counted.as_ref().map(|_| making.loaded.facts.max_rounding + world.rounding(scene));
         let json = json!({
@@ -195,8 +195,8 @@ impl PictureStats {
                 "triangles": world.triangles(), "polygons": shapes.polygons.len(),
                 "spheres": shapes.spheres.len(), "cones": shapes.cones.len(), "planes": shapes.planes.len(),
                 "vertices": shapes.vertices.len() + kept_vertices,
-                "kept_instances": world.kept.placed().len(),
-                "stored_triangles": shapes.triangles.len() + world.kept.stored(),
+                "kept_instances": world.instanced.placed().len(),
+                "stored_triangles": shapes.triangles.len() + world.instanced.stored(),
                 "bytes": world.bytes(),
                 "materials": scene.materials.len(), "textures": scene.textures.len(), "lights": scene.lights.len(),
             },
@@ -238,9 +238,9 @@ fn told(making: &Making, times: &Times, world: &World, structure: StructureStats
     let shapes = shapes.into_iter().filter(|(n, _)| *n > 0);
     let shapes: Vec<String> = shapes.map(|(n, kind)| format!("{} {kind}", grouped(n as u64))).collect();
     lines.push(format!("  scene      {}", shapes.join("  ")));
-    let kept = world.kept.placed().len();
+    let kept = world.instanced.placed().len();
     if kept > 0 {
-        let stored = grouped((world.shapes.triangles.len() + world.kept.stored()) as u64);
+        let stored = grouped((world.shapes.triangles.len() + world.instanced.stored()) as u64);
         let size = bytes(world.bytes() as u64);
         lines.push(format!("  stored     {stored} triangles  {size}  {} instances kept", grouped(kept as u64)));
     }

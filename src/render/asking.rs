@@ -3,7 +3,7 @@
 use super::Progress;
 use super::filters::Through;
 use super::observer::{Observer, Question};
-use crate::accel::{Accel, Gaps, Hit, Holes, Looking, Ray};
+use crate::accel::{Accel, Hit, HitQueries, IntersectFilter, OccludedFilter, Ray};
 
 /// A structure, one worker's scratch for it, and whoever may end the work.
 pub(crate) struct Asking<'a, A: Accel> {
@@ -21,45 +21,51 @@ impl<'a, A: Accel> Asking<'a, A> {
 
     /// The first hit of each ray.
     pub(crate) fn closest<P: Observer>(&mut self, rays: &[Ray], hits: &mut [Hit], probe: &mut P) {
-        self.look(&Looking::along(rays), hits, probe);
+        self.first_hits(&HitQueries::along(rays), hits, probe);
     }
 
-    /// The same, or the first behind another; they may pass gaps that are known.
-    pub(crate) fn look<P: Observer>(&mut self, looking: &Looking, hits: &mut [Hit], probe: &mut P) {
-        let question = if looking.after.is_some() { Question::Next } else { Question::Closest };
+    /// The first hit of each ray, or the first behind another; hits that their filter rejects may be passed.
+    pub(crate) fn first_hits<P: Observer>(&mut self, queries: &HitQueries, hits: &mut [Hit], probe: &mut P) {
+        let question = if queries.after.is_some() { Question::Next } else { Question::Closest };
         for (k, hits) in hits.chunks_mut(P::SLICE).enumerate() {
             if self.gives_up() {
                 return;
             }
             let start = k * P::SLICE;
             let part = start..start + hits.len();
-            let (rays, after) = (&looking.rays[part.clone()], looking.after.map(|after| &after[part.clone()]));
-            let pencil = looking.pencil.map(|pencil| pencil.part(part));
-            let since = looking.gaps.map(|gaps| Since { gaps, start });
-            let gaps = since.as_ref().map(|since| since as &dyn Gaps);
+            let (rays, after) = (&queries.rays[part.clone()], queries.after.map(|after| &after[part.clone()]));
+            let pencil = queries.pencil.map(|pencil| pencil.part(part));
+            let since = queries.filter.map(|filter| Since { filter, start });
+            let filter = since.as_ref().map(|since| since as &dyn IntersectFilter);
             probe.asked(question, rays, after.unwrap_or_default());
-            let looking = Looking { rays, pencil: pencil.as_ref(), after, gaps };
-            self.accel.look(&looking, hits, &mut self.scratch, probe);
+            let queries = HitQueries { rays, pencil: pencil.as_ref(), after, filter };
+            self.accel.first_hits(&queries, hits, &mut self.scratch, probe);
             probe.answered(hits);
         }
     }
 
     /// The first hit of each ray behind `after`.
     pub(crate) fn next<P: Observer>(&mut self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], probe: &mut P) {
-        self.look(&Looking { after: Some(after), ..Looking::along(rays) }, hits, probe);
+        self.first_hits(&HitQueries { after: Some(after), ..HitQueries::along(rays) }, hits, probe);
     }
 
     /// Whether anything opaque is hit by each ray.
     pub(crate) fn occluded<P: Observer>(&mut self, rays: &[Ray], blocked: &mut [bool], probe: &mut P) {
-        self.blocked(rays, None, blocked, probe);
+        self.occluded_filtered(rays, None, blocked, probe);
     }
 
     /// The same, and whether anything else is hit where it stops light.
     pub(crate) fn stopped<P: Observer>(&mut self, through: &Through, blocked: &mut [bool], probe: &mut P) {
-        self.blocked(through.rays, Some(through), blocked, probe);
+        self.occluded_filtered(through.rays, Some(through), blocked, probe);
     }
 
-    fn blocked<P: Observer>(&mut self, rays: &[Ray], through: Option<&Through>, blocked: &mut [bool], probe: &mut P) {
+    fn occluded_filtered<P: Observer>(
+        &mut self,
+        rays: &[Ray],
+        through: Option<&Through>,
+        blocked: &mut [bool],
+        probe: &mut P,
+    ) {
         let slices = rays.chunks(P::SLICE).zip(blocked.chunks_mut(P::SLICE));
         for (start, (rays, blocked)) in (0..).step_by(P::SLICE).zip(slices) {
             if self.gives_up() {
@@ -67,8 +73,8 @@ impl<'a, A: Accel> Asking<'a, A> {
             }
             probe.asked(Question::Occluded, rays, &[]);
             let part = through.map(|through| through.part(start..start + rays.len()));
-            let holes = part.as_ref().map(|part| part as &dyn Holes);
-            self.accel.blocked(rays, holes, blocked, &mut self.scratch, probe);
+            let filter = part.as_ref().map(|part| part as &dyn OccludedFilter);
+            self.accel.occluded_filtered(rays, filter, blocked, &mut self.scratch, probe);
             probe.answered(&[]);
         }
     }
@@ -81,16 +87,16 @@ impl<'a, A: Accel> Asking<'a, A> {
 
 /// What is known of rays from one on.
 struct Since<'a> {
-    gaps: &'a dyn Gaps,
+    filter: &'a dyn IntersectFilter,
     start: usize,
 }
 
-impl Gaps for Since<'_> {
-    fn is_gap(&self, ray: usize, prim: u32) -> bool {
-        self.gaps.is_gap(self.start + ray, prim)
+impl IntersectFilter for Since<'_> {
+    fn rejects(&self, ray: usize, prim: u32) -> bool {
+        self.filter.rejects(self.start + ray, prim)
     }
 
-    fn gaps(&self, first: usize, rays: u32, prim: u32) -> u32 {
-        self.gaps.gaps(self.start + first, rays, prim)
+    fn rejects_of(&self, first: usize, rays: u32, prim: u32) -> u32 {
+        self.filter.rejects_of(self.start + first, rays, prim)
     }
 }

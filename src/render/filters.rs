@@ -15,7 +15,7 @@ use super::texture::TextureStore;
 use super::wave::{Media, Medium};
 use super::world::World;
 use crate::accel::shapes::Prim;
-use crate::accel::{Hit, Holes, Ray};
+use crate::accel::{Hit, OccludedFilter, Ray};
 use crate::math::shear::RaySpace;
 use crate::math::{Vec3, triangle};
 use crate::scene::Scene;
@@ -179,7 +179,7 @@ impl<'a> Through<'a> {
     }
 }
 
-impl Holes for Through<'_> {
+impl OccludedFilter for Through<'_> {
     fn stops(&self, number: usize, prim: u32) -> bool {
         let (context, ray) = (self.context, &self.rays[number]);
         if let Some(stops) = context.clearings.as_ref().and_then(|clearings| clearings.stops(ray, prim)) {

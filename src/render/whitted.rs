@@ -27,7 +27,7 @@ use super::sky::{Arounds, Standpoint};
 use super::sobol::mix;
 use super::surface::{Surface, Target};
 use super::wave::{Crossing, Path, Queue, RayClass, Wave};
-use crate::accel::{Accel, Gaps, Hit, Looking, Ray};
+use crate::accel::{Accel, Hit, HitQueries, IntersectFilter, Ray};
 use crate::math::{DVec3, Vec3};
 use bytemuck::{Pod, Zeroable};
 use std::hint::black_box;
@@ -160,9 +160,9 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             let Asks { rays, pencil, cones, hits } = eyes.ask();
             let of = (RayClass::Primary, self.samples.len());
             let before = self.context.before::<P>(of, rays, Cones::Eyes(cones));
-            let gaps = before.as_ref().map(|before| before as &dyn Gaps);
-            let looking = Looking { rays, pencil: pencil.as_ref(), after: None, gaps };
-            self.asking.look(&looking, hits, self.counts.of(RayClass::Primary));
+            let filter = before.as_ref().map(|before| before as &dyn IntersectFilter);
+            let queries = HitQueries { rays, pencil: pencil.as_ref(), after: None, filter };
+            self.asking.first_hits(&queries, hits, self.counts.of(RayClass::Primary));
         }
         if !self.asking.cancelled {
             self.shade_eyes(&eyes);
@@ -177,10 +177,10 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let wave = &mut self.wave;
         let mut hits = std::mem::take(&mut wave.hits);
         let before = self.context.before::<P>((class, self.samples.len()), &wave.rays, (&*wave).into());
-        let gaps = before.as_ref().map(|before| before as &dyn Gaps);
+        let filter = before.as_ref().map(|before| before as &dyn IntersectFilter);
         let after = (!wave.starts).then_some(wave.after.as_slice());
-        let looking = Looking { rays: &wave.rays, pencil: None, after, gaps };
-        self.asking.look(&looking, &mut hits, self.counts.of(class));
+        let queries = HitQueries { rays: &wave.rays, pencil: None, after, filter };
+        self.asking.first_hits(&queries, &mut hits, self.counts.of(class));
         wave.hits = hits;
         Some(class)
     }

@@ -4,7 +4,7 @@ use super::super::query::{Goal, Query};
 use super::super::slabs::{BoxRay, limit};
 use super::super::wide::split::{Bounds, Cut, Item, around, cut_by_area};
 use crate::accel::Probe;
-use crate::accel::probe::{Extent, Place, Visit};
+use crate::accel::probe::{Extent, NodeId, Visit};
 use crate::math::aabb::Aabb;
 
 /// Prims that are worth a thread's while.
@@ -113,9 +113,9 @@ impl Tree {
 
     fn visit(&self, node: u32) -> Visit {
         let (place, listed) = match self.below(node) {
-            _ if self.of_places => (Place::Places(node), None),
-            Below::Leaf(prims) => (Place::Leaf(node), Some(index(prims.len()))),
-            Below::Children(_) => (Place::Node(node), None),
+            _ if self.of_places => (NodeId::Places(node), None),
+            Below::Leaf(prims) => (NodeId::Leaf(node), Some(index(prims.len()))),
+            Below::Children(_) => (NodeId::Node(node), None),
         };
         Visit { place, extent: Extent::Box(*self.bounds(node)), listed }
     }

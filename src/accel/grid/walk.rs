@@ -17,7 +17,7 @@ use super::lattice::{Cube, Lattice};
 use super::mailbox::Mailbox;
 use super::{EMPTY, GridOctree, GridScratch, NODE};
 use crate::accel::Probe;
-use crate::accel::probe::{Extent, Place, Visit};
+use crate::accel::probe::{Extent, NodeId, Visit};
 use crate::accel::query::{Goal, Query};
 use crate::accel::slabs::BoxRay;
 
@@ -125,7 +125,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
             let (axis, leave) = first_exit(exits);
             let entry = self.top[self.lattice.top_index(cell)];
             if entry & NODE == 0 {
-                probe.visit(|| self.told(Place::Cell(cell), self.lattice.top_cube(cell), Some(entry)));
+                probe.visit(|| self.told(NodeId::Cell(cell), self.lattice.top_cube(cell), Some(entry)));
             }
             if entry == EMPTY {
                 probe.step();
@@ -182,7 +182,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
             let (cell, level) = self.descend(root, at, probe);
             probe.visit(|| {
                 let cube = Cube { lo: at.map(|c| c >> level << level), level };
-                self.told(Place::Octant(cube.lo, level), cube, Some(cell))
+                self.told(NodeId::Octant(cube.lo, level), cube, Some(cell))
             });
             if cell == EMPTY {
                 probe.step();
@@ -234,7 +234,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
             probe.step();
             probe.visit(|| {
                 let cube = Cube { lo: at.map(|c| c >> level << level), level };
-                self.told(Place::OctreeNode(cube.lo, level), cube, None)
+                self.told(NodeId::OctreeNode(cube.lo, level), cube, None)
             });
             level -= 1;
             let octant = (at[0] >> level & 1) | (at[1] >> level & 1) << 1 | (at[2] >> level & 1) << 2;
@@ -244,7 +244,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
     }
 
     /// A node, or a cell and what it lists; a hierarchy in it is told by itself.
-    fn told(&self, place: Place, cube: Cube, cell: Option<u32>) -> Visit {
+    fn told(&self, place: NodeId, cube: Cube, cell: Option<u32>) -> Visit {
         let listed =
             cell.filter(|&cell| self.trees.root(cell).is_none()).map(|cell| self.cells.list(cell).len() as u32);
         Visit { place, extent: Extent::Box(self.lattice.bounds(cube)), listed }

@@ -1,6 +1,6 @@
 //! The structure of two levels: a tree for each object, and one over the places where they stand.
 
-use super::{Kept, Placed, Spot};
+use super::{InstancedObjects, PlacedObject, PrimLocation};
 use crate::accel::bvh::tree::{Below, Stack as PlaceStack, Tree as PlaceTree};
 use crate::accel::intersector::Exact;
 use crate::accel::query::{Closest, Culling, Goal, Next, Occluded, Query};
@@ -8,17 +8,20 @@ use crate::accel::slabs::BoxRay;
 use crate::accel::stats::listed_once;
 use crate::accel::wide::split::Item;
 use crate::accel::wide::{Splitting, Stack};
-use crate::accel::{Accel, Gaps, Hit, Holes, Looking, NO_PRIM, Probe, Ray, Shapes, StructureStats, Wide};
+use crate::accel::{
+    Accel, Hit, HitQueries, IntersectFilter, NO_PRIM, OccludedFilter, Probe, Ray, Shapes, StructureStats, Wide,
+};
 use crate::math::aabb::Aabb;
 use rayon::prelude::*;
 
-/// What is not kept in a tree of its own, as ever; each kept object in one; and a hierarchy of boxes over the places.
+/// Two levels: shapes that are not instanced in one tree, each object in one of its own, and a hierarchy of boxes over the
+/// places of objects.
 ///
 /// Prims have the numbers of the flattened scene, in rays and in hits.
 #[derive(Clone, Debug)]
 pub struct TwoLevel<'a> {
-    kept: &'a Kept,
-    /// Over what is not kept.
+    instanced: &'a InstancedObjects,
+    /// Over shapes that are not instanced.
     stored: Wide<'a>,
     /// Over each object, in its own frame.
     objects: Vec<Wide<'a>>,
@@ -38,17 +41,17 @@ pub struct LevelScratch {
 
 impl<'a> TwoLevel<'a> {
     /// Builds all trees; the same for every number of threads.
-    pub fn build(shapes: &'a Shapes, kept: &'a Kept, splitting: Splitting) -> Self {
-        let objects = kept.objects().par_iter().map(|o| Wide::build(o.shapes(), splitting)).collect();
-        let mut items: Vec<Item> = (0..).zip(kept.placed()).map(|(i, p)| Item::new(p.place.bounds, i)).collect();
+    pub fn build(shapes: &'a Shapes, instanced: &'a InstancedObjects, splitting: Splitting) -> Self {
+        let objects = instanced.objects().par_iter().map(|o| Wide::build(o.shapes(), splitting)).collect();
+        let mut items: Vec<Item> = (0..).zip(instanced.placed()).map(|(i, p)| Item::new(p.place.bounds, i)).collect();
         let mut places = PlaceTree::of_places();
         if !items.is_empty() {
             places.add(&mut items, 1);
         }
-        Self { kept, stored: Wide::build(shapes, splitting), objects, places }
+        Self { instanced, stored: Wide::build(shapes, splitting), objects, places }
     }
 
-    /// What is not kept.
+    /// Shapes that are not instanced.
     pub fn shapes(&self) -> &Shapes {
         self.stored.shapes()
     }
@@ -58,7 +61,7 @@ impl<'a> TwoLevel<'a> {
         let mut sum = self.stored.summary();
         let (mut above, mut below) = (0, sum.depth);
         sum.bytes += self.places.bytes() as u64;
-        if !self.kept.is_empty() {
+        if !self.instanced.is_empty() {
             self.places.each(0, 0, &mut |_, depth, node| match node {
                 Below::Children(_) => sum.n_in += 1,
                 Below::Leaf(_) => above = above.max(depth + 1),
@@ -82,28 +85,28 @@ impl<'a> TwoLevel<'a> {
         for (i, object) in self.objects.iter().enumerate() {
             object.check().map_err(|e| format!("object {i}: {e}"))?;
         }
-        let mut leaves = vec![0u32; self.kept.placed().len()];
+        let mut leaves = vec![0u32; self.instanced.placed().len()];
         let leaf = |places: &[u32]| {
             places.iter().fold(Aabb::EMPTY, |b, &i| {
                 leaves[i as usize] += 1;
-                b.union(self.kept.placed()[i as usize].place.bounds)
+                b.union(self.instanced.placed()[i as usize].place.bounds)
             })
         };
-        if !self.kept.is_empty()
+        if !self.instanced.is_empty()
             && let Some((node, content)) = self.places.fault(0, leaf)
         {
             let bounds = self.places.bounds(node);
             return Err(format!("node {node} of the places is {bounds:?}, below it is {content:?}"));
         }
         listed_once(&leaves, "leaves of places")?;
-        for (i, placed) in self.kept.placed().iter().enumerate() {
+        for (i, placed) in self.instanced.placed().iter().enumerate() {
             self.holds(placed).map_err(|e| format!("place {i}: {e}"))?;
         }
         Ok(self.summary())
     }
 
-    fn holds(&self, Placed { object, place, .. }: &Placed) -> Result<(), String> {
-        for &corner in &self.kept.objects()[*object as usize].shapes().vertices {
+    fn holds(&self, PlacedObject { object, place, .. }: &PlacedObject) -> Result<(), String> {
+        for &corner in &self.instanced.objects()[*object as usize].shapes().vertices {
             let there = place.corner(corner);
             let off = (place.carried(there) - corner.as_dvec3()).abs();
             let outside = place.bounds.union(Aabb { lo: there, hi: there }) != place.bounds;
@@ -117,12 +120,12 @@ impl<'a> TwoLevel<'a> {
 
     /// Goes on with a query that knows what is stored, through the objects where they stand.
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, scratch: &mut LevelScratch, probe: &mut P) {
-        let (false, Some(stack)) = (self.kept.is_empty(), &mut scratch.object) else { return };
+        let (false, Some(stack)) = (self.instanced.is_empty(), &mut scratch.object) else { return };
         let ray = BoxRay::new(query);
         self.places.walk(0, &ray, query, &mut scratch.places, probe, |places, query, probe| {
             places.iter().any(|&i| {
-                let placed = &self.kept.placed()[i as usize];
-                let opaque = self.kept.objects()[placed.object as usize].opaque;
+                let placed = &self.instanced.placed()[i as usize];
+                let opaque = self.instanced.objects()[placed.object as usize].opaque;
                 let tree = &self.objects[placed.object as usize];
                 query.opaque = Some(opaque);
                 (opaque || query.goal.wants_open())
@@ -141,7 +144,7 @@ impl<'a> TwoLevel<'a> {
         query: impl Fn(usize, &Hit) -> (f32, G),
     ) {
         for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-            let known = Hit { prim: self.kept.number(hit.prim), ..*hit };
+            let known = Hit { prim: self.instanced.number(hit.prim), ..*hit };
             let (t_min, goal) = query(i, &known);
             let (mut query, usable) = Query::new(self.stored.shapes(), ray, t_min, goal);
             if usable {
@@ -157,18 +160,18 @@ impl<'a> TwoLevel<'a> {
     /// The rays as the tree of what is stored knows them: by the numbers that prims have there.
     fn renumber(&self, rays: &[Ray], renumbered: &mut Vec<Ray>) {
         renumbered.clear();
-        renumbered.extend(rays.iter().map(|ray| match self.kept.find(ray.exclude) {
-            Spot::Stored(exclude) => Ray { exclude, ..*ray },
-            Spot::Placed(..) => Ray { exclude: NO_PRIM, ..*ray },
+        renumbered.extend(rays.iter().map(|ray| match self.instanced.find(ray.exclude) {
+            PrimLocation::Stored(exclude) => Ray { exclude, ..*ray },
+            PrimLocation::Placed(..) => Ray { exclude: NO_PRIM, ..*ray },
         }));
     }
 
     /// A hit such that the same stored prims come after it as after `after`.
     fn after(&self, after: &Hit) -> Hit {
-        match self.kept.find(after.prim) {
-            Spot::Stored(prim) => Hit { prim, ..*after },
+        match self.instanced.find(after.prim) {
+            PrimLocation::Stored(prim) => Hit { prim, ..*after },
             // After the last stored prim with a lower number; where there is none, after everything nearer.
-            Spot::Placed(placed, _) => match placed.before.checked_sub(1) {
+            PrimLocation::Placed(placed, _) => match placed.before.checked_sub(1) {
                 Some(prim) => Hit { prim, ..*after },
                 None => Hit { prim: NO_PRIM, t: after.t.next_down(), ..*after },
             },
@@ -178,23 +181,23 @@ impl<'a> TwoLevel<'a> {
 
 /// Who is asked of prims by the numbers that they have in the tree of what is stored, and knows them by those of the scene.
 struct Numbered<'a, T: ?Sized> {
-    kept: &'a Kept,
+    instanced: &'a InstancedObjects,
     of: &'a T,
 }
 
-impl Holes for Numbered<'_, dyn Holes + '_> {
+impl OccludedFilter for Numbered<'_, dyn OccludedFilter + '_> {
     fn stops(&self, ray: usize, prim: u32) -> bool {
-        self.of.stops(ray, self.kept.number(prim))
+        self.of.stops(ray, self.instanced.number(prim))
     }
 }
 
-impl Gaps for Numbered<'_, dyn Gaps + '_> {
-    fn is_gap(&self, ray: usize, prim: u32) -> bool {
-        self.of.is_gap(ray, self.kept.number(prim))
+impl IntersectFilter for Numbered<'_, dyn IntersectFilter + '_> {
+    fn rejects(&self, ray: usize, prim: u32) -> bool {
+        self.of.rejects(ray, self.instanced.number(prim))
     }
 
-    fn gaps(&self, first: usize, rays: u32, prim: u32) -> u32 {
-        self.of.gaps(first, rays, self.kept.number(prim))
+    fn rejects_of(&self, first: usize, rays: u32, prim: u32) -> u32 {
+        self.of.rejects_of(first, rays, self.instanced.number(prim))
     }
 }
 
@@ -212,20 +215,20 @@ impl Accel for TwoLevel<'_> {
         }
     }
 
-    fn look<P: Probe>(&self, looking: &Looking, hits: &mut [Hit], scratch: &mut LevelScratch, probe: &mut P) {
-        let Looking { rays, after, gaps, .. } = *looking;
+    fn first_hits<P: Probe>(&self, queries: &HitQueries, hits: &mut [Hit], scratch: &mut LevelScratch, probe: &mut P) {
+        let HitQueries { rays, after, filter, .. } = *queries;
         self.renumber(rays, &mut scratch.rays);
         scratch.after.clear();
         scratch.after.extend(after.into_iter().flatten().map(|after| self.after(after)));
-        let numbered = gaps.map(|of| Numbered { kept: self.kept, of });
-        let stored = Looking {
+        let numbered = filter.map(|of| Numbered { instanced: self.instanced, of });
+        let stored = HitQueries {
             rays: &scratch.rays,
             pencil: None,
             after: after.is_some().then_some(&scratch.after),
-            gaps: numbered.as_ref().map(|gaps| gaps as &dyn Gaps),
+            filter: numbered.as_ref().map(|filter| filter as &dyn IntersectFilter),
         };
-        self.stored.look(&stored, hits, &mut scratch.stored, probe);
-        let before = |i: usize, known: &Hit| Closest::before(known, Exact).passing(gaps, i);
+        self.stored.first_hits(&stored, hits, &mut scratch.stored, probe);
+        let before = |i: usize, known: &Hit| Closest::before(known, Exact).passing(filter, i);
         match after {
             None => self.go_on(rays, hits, scratch, probe, |i, known| (rays[i].t_min, before(i, known))),
             Some(after) => self.go_on(rays, hits, scratch, probe, |i, known| {
@@ -234,20 +237,20 @@ impl Accel for TwoLevel<'_> {
         }
     }
 
-    fn blocked<P: Probe>(
+    fn occluded_filtered<P: Probe>(
         &self,
         rays: &[Ray],
-        holes: Option<&dyn Holes>,
+        filter: Option<&dyn OccludedFilter>,
         blocked: &mut [bool],
         scratch: &mut LevelScratch,
         probe: &mut P,
     ) {
         self.renumber(rays, &mut scratch.rays);
-        let numbered = holes.map(|of| Numbered { kept: self.kept, of });
-        let stored = numbered.as_ref().map(|holes| holes as &dyn Holes);
-        self.stored.blocked(&scratch.rays, stored, blocked, &mut scratch.stored, probe);
+        let numbered = filter.map(|of| Numbered { instanced: self.instanced, of });
+        let stored = numbered.as_ref().map(|filter| filter as &dyn OccludedFilter);
+        self.stored.occluded_filtered(&scratch.rays, stored, blocked, &mut scratch.stored, probe);
         for (i, (ray, blocked)) in rays.iter().zip(blocked).enumerate().filter(|(_, (_, blocked))| !**blocked) {
-            let (mut query, usable) = Query::new(self.stored.shapes(), ray, ray.t_min, Occluded::by(holes, i, Exact));
+            let (mut query, usable) = Query::new(self.stored.shapes(), ray, ray.t_min, Occluded::by(filter, i, Exact));
             if usable {
                 self.walk(&mut query, scratch, probe);
             }

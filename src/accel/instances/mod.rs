@@ -1,12 +1,12 @@
 //! Objects that are stored once and stand in several places.
 //!
-//! A scene may show a mesh a thousand times. Flattened, it is stored a thousand times; kept, its triangles and the tree
+//! A scene may show a mesh a thousand times. Flattened, it is stored a thousand times; instanced, its triangles and the tree
 //! over them are stored once ([`Object`]), and [`TwoLevel`] holds a tree over the places where they stand. What is hit is
 //! the same bit for bit, for a triangle that a ray comes near is put into the scene's frame by the function that
-//! flattening uses ([`placed`]), and is tested there. Only boxes are asked in the object's own frame ([`Place`] has
+//! flattening uses ([`placed`]), and is tested there. Only boxes are asked in the object's own frame ([`ObjectTransform`] has
 //! the proof that this loses no hit).
 //!
-//! Prims have the numbers of the flattened scene: [`Kept::find`] leads from there to what is stored.
+//! Prims have the numbers of the flattened scene: [`InstancedObjects::find`] leads from there to what is stored.
 
 mod levels;
 mod place;
@@ -14,7 +14,7 @@ mod place;
 mod tests;
 
 pub use levels::{LevelScratch, TwoLevel};
-pub use place::{Place, placed};
+pub use place::{ObjectTransform, placed};
 
 use super::shapes::Prim;
 use super::{NO_PRIM, Shapes};
@@ -56,37 +56,37 @@ impl Object {
 
 /// An object where it stands.
 #[derive(Clone, Debug)]
-pub struct Placed {
-    /// Index into [`Kept::objects`].
+pub struct PlacedObject {
+    /// Index into [`InstancedObjects::objects`].
     pub object: u32,
     /// The number of its first triangle among the prims of the scene; the others follow.
     pub first: u32,
     /// Stored prims with lower numbers.
     before: u32,
     /// How it stands there.
-    pub place: Place,
+    pub place: ObjectTransform,
 }
 
-/// Everything that is kept; nothing by default.
+/// Objects that are stored once, and the places where they stand; nothing by default.
 #[derive(Clone, Debug, Default)]
-pub struct Kept {
+pub struct InstancedObjects {
     objects: Vec<Object>,
     /// By their first prims, ascending.
-    placed: Vec<Placed>,
+    placed: Vec<PlacedObject>,
     /// Triangles of all that are placed.
     shown: u32,
 }
 
 /// What a prim of the scene is.
 #[derive(Clone, Copy, Debug)]
-pub enum Spot<'k> {
+pub enum PrimLocation<'k> {
     /// A prim of the shapes in the scene's frame, by its number there.
     Stored(u32),
     /// A triangle of an object, by its number there.
-    Placed(&'k Placed, u32),
+    Placed(&'k PlacedObject, u32),
 }
 
-impl Kept {
+impl InstancedObjects {
     /// Adds an object that stands nowhere yet; its index.
     pub fn add(&mut self, object: Object) -> u32 {
         self.objects.push(object);
@@ -94,23 +94,23 @@ impl Kept {
     }
 
     /// Puts an object somewhere; places come in the order of their first prims. `first` is that of this one.
-    pub fn put(&mut self, object: u32, first: u32, place: Place) {
-        self.placed.push(Placed { object, first, before: first - self.shown, place });
+    pub fn put(&mut self, object: u32, first: u32, place: ObjectTransform) {
+        self.placed.push(PlacedObject { object, first, before: first - self.shown, place });
         self.shown += self.count(object);
     }
 
-    /// Whether nothing is.
+    /// Whether no object is placed.
     pub fn is_empty(&self) -> bool {
         self.placed.is_empty()
     }
 
-    /// What is stored once.
+    /// The objects that are stored once.
     pub fn objects(&self) -> &[Object] {
         &self.objects
     }
 
     /// Where all of it stands.
-    pub fn placed(&self) -> &[Placed] {
+    pub fn placed(&self) -> &[PlacedObject] {
         &self.placed
     }
 
@@ -136,19 +136,23 @@ impl Kept {
 
     /// What prim `prim` of the scene is. [`NO_PRIM`] is stored as itself.
     #[inline]
-    pub fn find(&self, prim: u32) -> Spot<'_> {
+    pub fn find(&self, prim: u32) -> PrimLocation<'_> {
         if self.placed.is_empty() || prim == NO_PRIM {
-            return Spot::Stored(prim);
+            return PrimLocation::Stored(prim);
         }
         self.find_among(prim)
     }
 
     #[inline(never)]
-    fn find_among(&self, prim: u32) -> Spot<'_> {
+    fn find_among(&self, prim: u32) -> PrimLocation<'_> {
         let behind = self.placed.partition_point(|p| p.first <= prim);
-        let Some(placed) = behind.checked_sub(1).map(|i| &self.placed[i]) else { return Spot::Stored(prim) };
+        let Some(placed) = behind.checked_sub(1).map(|i| &self.placed[i]) else { return PrimLocation::Stored(prim) };
         let (triangle, count) = (prim - placed.first, self.count(placed.object));
-        if triangle < count { Spot::Placed(placed, triangle) } else { Spot::Stored(placed.before + (triangle - count)) }
+        if triangle < count {
+            PrimLocation::Placed(placed, triangle)
+        } else {
+            PrimLocation::Stored(placed.before + (triangle - count))
+        }
     }
 
     /// The number among the prims of the scene of a stored one.
@@ -162,20 +166,20 @@ impl Kept {
     }
 
     /// Triangle `triangle` of an object where it stands.
-    pub fn triangle(&self, placed: &Placed, triangle: u32) -> Triangle {
+    pub fn triangle(&self, placed: &PlacedObject, triangle: u32) -> Triangle {
         self.objects[placed.object as usize].shapes.triangle(triangle).map(|corner| placed.place.corner(corner))
     }
 
-    /// What prim `prim` of the scene is, in the scene's frame; `shapes` are those that are not kept.
+    /// What prim `prim` of the scene is, in the scene's frame; `shapes` are those that are not instanced.
     #[inline]
     pub fn prim<'a>(&self, shapes: &'a Shapes, prim: u32) -> Prim<'a> {
         match self.find(prim) {
-            Spot::Stored(prim) => shapes.prim(prim),
-            Spot::Placed(placed, triangle) => Prim::Triangle(self.triangle(placed, triangle)),
+            PrimLocation::Stored(prim) => shapes.prim(prim),
+            PrimLocation::Placed(placed, triangle) => Prim::Triangle(self.triangle(placed, triangle)),
         }
     }
 
-    /// From now on nothing that is kept stops light by itself: who asks is asked what it lets through.
+    /// From now on no instanced object is opaque: filters decide what it lets through.
     pub fn open_all(&mut self) {
         self.objects.iter_mut().for_each(|object| object.opaque = false);
     }

@@ -8,7 +8,7 @@ use crate::math::triangles::Corners8;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 
 /// A corner of an object in the scene's frame: moved in `f64` and rounded once. What is flattened is placed by this, and
-/// so is what is kept, each time a ray comes near: both are the same triangle, bit for bit.
+/// so are instanced objects, each time a ray comes near: both are the same triangle, bit for bit.
 #[inline]
 pub fn placed(frame_from_object: &DAffine3, corner: Vec3) -> Vec3 {
     frame_from_object.transform_point3(corner.as_dvec3()).as_vec3()
@@ -24,7 +24,7 @@ pub fn placed(frame_from_object: &DAffine3, corner: Vec3) -> Vec3 {
 /// N (o − c) and N d: [`PLACED_PAD`](crate::math::bounds::PLACED_PAD) and
 /// [`PLACED_DRIFT`](crate::math::bounds::PLACED_DRIFT).
 #[derive(Clone, Debug)]
-pub struct Place {
+pub struct ObjectTransform {
     frame_from_object: DAffine3,
     /// N.
     object_from_frame: DMat3,
@@ -34,7 +34,7 @@ pub struct Place {
     pub bounds: Aabb,
 }
 
-impl Place {
+impl ObjectTransform {
     /// A place from which rays can be carried to the corners of `object`, all of which count; `None` where that is too
     /// inexact to be of use: singular or nearly so, far too large or small, or so far away that rounding moves the corners
     /// by a part of the object's size that matters.
@@ -110,7 +110,7 @@ impl Place {
 
 /// All corners of an object that stands somewhere, to be placed and carried back.
 struct Measure<'a> {
-    place: &'a Place,
+    place: &'a ObjectTransform,
     corners: &'a [Vec3],
 }
 
@@ -200,7 +200,7 @@ mod tests {
         };
         for len in [3, 8, 9, 64, 101] {
             let object = Shapes { vertices: (0..len).map(at).collect(), ..Shapes::default() };
-            let place = Place::new(matrix, &object).expect("an ordinary place");
+            let place = ObjectTransform::new(matrix, &object).expect("an ordinary place");
             let there = || object.vertices.iter().map(|&corner| place.corner(corner));
             let off = |(there, corner): (Vec3, &Vec3)| (place.carried(there) - corner.as_dvec3()).abs();
             let expected = Measured {
@@ -220,7 +220,7 @@ mod tests {
     fn a_corner_that_is_nowhere_has_no_place() {
         for far in [f32::NAN, f32::INFINITY, f32::MAX] {
             let object = Shapes { vertices: vec![Vec3::ZERO, Vec3::X, Vec3::splat(far)], ..Shapes::default() };
-            assert!(Place::new(DAffine3::from_scale(DVec3::splat(2.0)), &object).is_none(), "{far}");
+            assert!(ObjectTransform::new(DAffine3::from_scale(DVec3::splat(2.0)), &object).is_none(), "{far}");
         }
     }
 }

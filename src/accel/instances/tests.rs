@@ -1,6 +1,6 @@
-//! What is kept is hit as if it were flattened: brute force on the flattened scene is the specification.
+//! Instanced objects are hit as if they were flattened: brute force on the flattened scene is the specification.
 
-use super::{Kept, Object, Place, Spot, TwoLevel, placed};
+use super::{InstancedObjects, Object, ObjectTransform, PrimLocation, TwoLevel, placed};
 use crate::accel::tests::scenes::{self, ray};
 use crate::accel::{Accel, BitSet, Hit, NO_PRIM, NoProbe, Ray, RayCounts, Shapes, Splitting, Unculled};
 use crate::math::random::Random;
@@ -8,20 +8,20 @@ use crate::math::simd::{Kernel, LANES, Level, Simd};
 use crate::math::triangles::{Corners8, corners_of, set_corners};
 use crate::math::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
-/// A scene twice: as it is kept, and flattened.
+/// A scene twice: instanced, and flattened.
 struct Both {
     stored: Shapes,
-    kept: Kept,
+    instanced: InstancedObjects,
     flat: Shapes,
 }
 
 impl Both {
     /// Objects where they stand, in this order, with everything else of `others` between the first and the second.
     fn new(objects: Vec<Object>, places: &[(usize, DAffine3)], others: &Shapes) -> Self {
-        let mut kept = Kept::default();
+        let mut instanced = InstancedObjects::default();
         let (mut flat, mut stored) = (Shapes::default(), Shapes::default());
         let mut opaque = Vec::new();
-        let ids: Vec<u32> = objects.iter().map(|o| kept.add(o.clone())).collect();
+        let ids: Vec<u32> = objects.iter().map(|o| instanced.add(o.clone())).collect();
         for (i, (object, matrix)) in places.iter().enumerate() {
             if i == 1 {
                 opaque.extend((0..others.triangles.len() as u32).map(|p| others.opaque.get(p)));
@@ -32,8 +32,8 @@ impl Both {
             let first = flat.triangles.len() as u32;
             let corners: Vec<Vec3> = own.shapes().vertices.iter().map(|&v| placed(matrix, v)).collect();
             append(&mut flat, &corners, &own.shapes().triangles);
-            match Place::new(*matrix, own.shapes()) {
-                Some(place) => kept.put(ids[*object], first, place),
+            match ObjectTransform::new(*matrix, own.shapes()) {
+                Some(place) => instanced.put(ids[*object], first, place),
                 None => append(&mut stored, &corners, &own.shapes().triangles),
             }
             opaque.extend(vec![own.opaque; own.shapes().triangles.len()]);
@@ -50,12 +50,12 @@ impl Both {
             bits
         };
         flat.opaque = bits(&flat, &|p| p);
-        stored.opaque = bits(&stored, &|p| kept.number(p));
-        Self { stored, kept, flat }
+        stored.opaque = bits(&stored, &|p| instanced.number(p));
+        Self { stored, instanced, flat }
     }
 
     fn level(&self, splitting: Splitting) -> TwoLevel<'_> {
-        TwoLevel::build(&self.stored, &self.kept, splitting)
+        TwoLevel::build(&self.stored, &self.instanced, splitting)
     }
 }
 
@@ -74,7 +74,7 @@ fn objects() -> Vec<Object> {
     vec![object(&scenes::star(12, 8), true), object(&scenes::soup(40, 0.8), false), object(&scenes::lattice(30), true)]
 }
 
-/// Spheres, cones, planes and triangles beside what is kept.
+/// Spheres, cones, planes and triangles beside instanced objects.
 fn others() -> Shapes {
     let mix = scenes::mix();
     let shapes = Shapes { polygons: Vec::new(), polygon_corners: Vec::new(), ..mix };
@@ -132,7 +132,7 @@ fn assert_hits_of_the_flattened_scene(name: &str, both: &Both, rays: &[Ray]) {
 #[test]
 fn objects_that_are_turned_stretched_mirrored_and_sheared_are_hit_as_if_flattened() {
     let both = Both::new(objects(), &about(30, 0.4, DVec3::ZERO), &others());
-    assert_eq!(both.kept.placed().len(), 30);
+    assert_eq!(both.instanced.placed().len(), 30);
     assert_hits_of_the_flattened_scene("about", &both, &scenes::rays(&both.flat, 60));
 }
 
@@ -148,14 +148,14 @@ fn objects_far_away_tiny_and_huge_are_hit_as_if_flattened() {
     for (name, size, at) in [
         ("far away", 1.0, DVec3::new(300.0, -700.0, 50.0)),
         ("very far away", 1.0, DVec3::new(1e3, 0.0, -9e3)),
-        ("farther than is kept", 1.0, DVec3::new(4e6, 0.0, -9e6)),
+        ("farther than is instanced", 1.0, DVec3::new(4e6, 0.0, -9e6)),
         ("tiny", 1e-4, DVec3::ZERO),
-        ("tinier than is kept", 1e-9, DVec3::ZERO),
+        ("tinier than is instanced", 1e-9, DVec3::ZERO),
         ("huge", 1e5, DVec3::ZERO),
-        ("larger than is kept", 1e12, DVec3::ZERO),
+        ("larger than is instanced", 1e12, DVec3::ZERO),
     ] {
         let both = Both::new(objects(), &about(12, size, at), &Shapes::default());
-        assert_eq!(both.kept.is_empty(), name.ends_with("is kept"), "{name}");
+        assert_eq!(both.instanced.is_empty(), name.ends_with("is instanced"), "{name}");
         assert_hits_of_the_flattened_scene(name, &both, &scenes::rays(&both.flat, 30));
     }
 }
@@ -163,7 +163,7 @@ fn objects_far_away_tiny_and_huge_are_hit_as_if_flattened() {
 #[test]
 fn singular_and_extreme_placements_are_flattened() {
     let star = scenes::star(12, 8);
-    let at = |diagonal: DVec3| Place::new(DAffine3::from_scale(diagonal), &star);
+    let at = |diagonal: DVec3| ObjectTransform::new(DAffine3::from_scale(diagonal), &star);
     assert!(at(DVec3::new(1.0, -2.0, 3.0)).is_some());
     for diagonal in [
         DVec3::new(1.0, 0.0, 1.0),
@@ -175,11 +175,14 @@ fn singular_and_extreme_placements_are_flattened() {
     ] {
         assert!(at(diagonal).is_none(), "{diagonal}");
     }
-    assert!(Place::new(DAffine3::from_translation(DVec3::splat(1e5)), &star).is_none(), "rounding moves corners");
+    assert!(
+        ObjectTransform::new(DAffine3::from_translation(DVec3::splat(1e5)), &star).is_none(),
+        "rounding moves corners"
+    );
     let places =
         [(0, DAffine3::IDENTITY), (1, DAffine3::from_scale(DVec3::new(1.0, 1.0, 0.0))), (0, DAffine3::IDENTITY)];
     let both = Both::new(objects(), &places, &others());
-    assert_eq!(both.kept.placed().len(), 2);
+    assert_eq!(both.instanced.placed().len(), 2);
     assert_hits_of_the_flattened_scene("one is flat", &both, &scenes::rays(&both.flat, 30));
 }
 
@@ -246,22 +249,22 @@ fn prims_have_the_numbers_of_the_flattened_scene() {
     let both = Both::new(objects(), &about(12, 0.7, DVec3::ZERO), &others());
     let mut stored = 0;
     for prim in 0..both.flat.triangles.len() as u32 {
-        let corners = match both.kept.find(prim) {
-            Spot::Stored(number) => {
-                assert_eq!((number, both.kept.number(number)), (stored, prim));
+        let corners = match both.instanced.find(prim) {
+            PrimLocation::Stored(number) => {
+                assert_eq!((number, both.instanced.number(number)), (stored, prim));
                 stored += 1;
                 both.stored.triangle(number)
             }
-            Spot::Placed(placed, triangle) => both.kept.triangle(placed, triangle),
+            PrimLocation::Placed(placed, triangle) => both.instanced.triangle(placed, triangle),
         };
         assert_eq!(corners, both.flat.triangle(prim));
     }
     assert_eq!(stored as usize, both.stored.triangles.len());
-    assert!(matches!(both.kept.find(NO_PRIM), Spot::Stored(NO_PRIM)));
-    assert_eq!(both.kept.number(NO_PRIM), NO_PRIM);
+    assert!(matches!(both.instanced.find(NO_PRIM), PrimLocation::Stored(NO_PRIM)));
+    assert_eq!(both.instanced.number(NO_PRIM), NO_PRIM);
 }
 
-struct Placing<'a>(&'a Place, &'a Corners8);
+struct Placing<'a>(&'a ObjectTransform, &'a Corners8);
 
 impl Kernel for Placing<'_> {
     type Output = Corners8;
@@ -276,7 +279,7 @@ impl Kernel for Placing<'_> {
 fn eight_triangles_at_once_are_placed_as_flattening_places_them() {
     let soup = scenes::soup(64, 0.8);
     for (_, matrix) in about(15, 0.37, DVec3::new(0.1, -3.3, 40.0)) {
-        let Some(place) = Place::new(matrix, &soup) else { panic!("{matrix} is nothing extreme") };
+        let Some(place) = ObjectTransform::new(matrix, &soup) else { panic!("{matrix} is nothing extreme") };
         for first in (0..64).step_by(LANES) {
             let mut corners = [[[0.0; LANES]; 3]; 3];
             (0..LANES).for_each(|lane| set_corners(&mut corners, lane, &soup.triangle((first + lane) as u32)));
@@ -296,8 +299,8 @@ fn memory_grows_with_what_is_stored_not_with_what_is_shown() {
     let bytes = |n: usize| {
         let places: Vec<_> = about(n, 0.4, DVec3::ZERO).iter().map(|(_, place)| (0, *place)).collect();
         let both = Both::new(vec![object(&scenes::star(60, 30), true)], &places, &Shapes::default());
-        let bytes = both.level(Splitting::Octree).summary().bytes + both.kept.bytes() as u64;
-        (bytes, both.kept.stored(), both.kept.shown())
+        let bytes = both.level(Splitting::Octree).summary().bytes + both.instanced.bytes() as u64;
+        (bytes, both.instanced.stored(), both.instanced.shown())
     };
     let ((few, stored, _), (many, same, shown)) = (bytes(12), bytes(1200));
     assert_eq!((stored, shown as usize), (same, stored * 1200));

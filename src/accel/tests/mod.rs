@@ -28,7 +28,7 @@ const PARAMS: [GridParams; 5] = [
 /// Prims that are not opaque stop every third ray, each another third.
 pub(crate) struct Sieve;
 
-impl Holes for Sieve {
+impl OccludedFilter for Sieve {
     fn stops(&self, ray: usize, prim: u32) -> bool {
         (ray + prim as usize * 7).is_multiple_of(3)
     }
@@ -41,7 +41,7 @@ pub(crate) fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 10]> {
     let mut blocked = vec![false; rays.len()];
     let mut stopped = vec![false; rays.len()];
     let mut second = first.clone();
-    accel.blocked(rays, Some(&Sieve), &mut stopped, &mut scratch, &mut NoProbe);
+    accel.occluded_filtered(rays, Some(&Sieve), &mut stopped, &mut scratch, &mut NoProbe);
     accel.closest(rays, &mut first, &mut scratch, &mut NoProbe);
     accel.occluded(rays, &mut blocked, &mut scratch, &mut NoProbe);
     accel.next(rays, &first, &mut second, &mut scratch, &mut NoProbe);

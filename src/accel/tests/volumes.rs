@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::accel::probe::Extent;
-use crate::accel::volumes::{Ball, Volume, Volumes};
+use crate::accel::volumes::{BoundingSphere, Volume, Volumes};
 use crate::math::aabb::Aabb;
 
 fn counts<A: Accel>(accel: &A, rays: &[Ray]) -> RayCounts {
@@ -24,7 +24,7 @@ fn picture(width: f32) -> Vec<Ray> {
 fn a_sphere_around_46_polygons_that_an_eighth_of_the_rays_enter_saves_six_tests_of_seven() {
     let shapes = crate::bench::star::star(23, 2);
     assert_eq!((shapes.len(), shapes.objects().len()), (46, 1));
-    let spheres = Volumes::<Ball>::build(&shapes);
+    let spheres = Volumes::<BoundingSphere>::build(&shapes);
 
     // The wider the picture, the fewer rays enter; one after the other, as the camera looks past the middle.
     let entered = |width| counts(&spheres, &picture(width)).n_ets;
@@ -55,7 +55,7 @@ fn a_sphere_around_a_polygon_holds_its_box() {
     let vertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.01], [0.0, 1.0, 0.0]].map(Vec3::from).to_vec();
     let shapes = Shapes { vertices, polygons: vec![(0, 4)], polygon_corners: vec![0, 1, 2, 3], ..Shapes::default() };
     let Aabb { lo, hi } = shapes.bounds(0);
-    let Extent::Ball { center, radius } = <Ball as Volume>::around(&shapes, 0..1).extent() else { panic!() };
+    let Extent::Ball { center, radius } = <BoundingSphere as Volume>::around(&shapes, 0..1).extent() else { panic!() };
     for corner in [lo, hi, Vec3::new(lo.x, lo.y, hi.z), Vec3::new(hi.x, lo.y, hi.z)] {
         assert!((corner.as_dvec3() - center).length() <= radius, "{corner}");
     }
@@ -85,7 +85,7 @@ fn only_entered_objects_are_tested<V: Volume>(shapes: &Shapes) {
 
 #[test]
 fn only_objects_whose_volume_is_entered_are_tested() {
-    only_entered_objects_are_tested::<Ball>(&clusters());
+    only_entered_objects_are_tested::<BoundingSphere>(&clusters());
     only_entered_objects_are_tested::<Aabb>(&clusters());
 }
 
@@ -98,7 +98,7 @@ fn a_ray_that_touches_a_volume_enters_it() {
         let corners: Vec<Vec3> = (0..3).map(|_| r.cube() * scale).collect();
         let shapes = scenes::mesh(corners, vec![[0, 1, 2]]);
         let rays = far_rays(&shapes, 40, 1.0..1e6);
-        assert_eq!(wrong(&Volumes::<Ball>::build(&shapes), &shapes, &rays), 0);
+        assert_eq!(wrong(&Volumes::<BoundingSphere>::build(&shapes), &shapes, &rays), 0);
         assert_eq!(wrong(&Volumes::<Aabb>::build(&shapes), &shapes, &rays), 0);
     }
 }

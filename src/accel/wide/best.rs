@@ -4,11 +4,11 @@
 //! hit that is left at the end needs its own; where they do, or touch an end of the ray's range, the exact test decides.
 
 use super::node::{Child, Tree};
-use super::ready::ReadyRay;
+use super::prepared::PreparedRay;
 use super::slabs::BoxMargins;
 use crate::accel::probe::Outcome;
 use crate::accel::query::Goal;
-use crate::accel::wave::Wave;
+use crate::accel::query_batch::QueryBatch;
 use crate::accel::{NO_PRIM, Shapes};
 use crate::math::shear::RaySpace;
 use crate::math::sight::{Look, Sight};
@@ -34,7 +34,7 @@ pub(super) struct Best {
     /// Its exact distance lies between these. Without a hit: infinite, and the end of the ray's range.
     pub low: f32,
     pub high: f32,
-    pub place: Place,
+    pub place: TriangleSlot,
 }
 
 /// What a ray meets of a block.
@@ -60,14 +60,14 @@ fn lanes(count: u32) -> u32 {
 
 /// A triangle in a block.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct TriangleSlot {
     pub block: u32,
     pub lane: u32,
     /// [`NO_PRIM`] where there is none.
     pub prim: u32,
 }
 
-impl Place {
+impl TriangleSlot {
     const NONE: Self = Self { block: 0, lane: 0, prim: NO_PRIM };
 
     /// Block and lane in a word; there are fewer than 2²⁷ blocks.
@@ -99,25 +99,25 @@ impl Place {
 impl Seeker {
     /// A ray that was made ready, whose hits count from `t_min` on, of this number in its wave.
     #[inline(always)]
-    pub(super) fn new(ray: &ReadyRay, t_min: f32, number: usize, exclude: u32) -> Self {
+    pub(super) fn new(ray: &PreparedRay, t_min: f32, number: usize, exclude: u32) -> Self {
         Self {
             number,
             limit: ray.slabs.limit,
             t_min,
             exclude,
-            best: Best { low: f32::INFINITY, high: ray.t_max, place: Place::NONE },
+            best: Best { low: f32::INFINITY, high: ray.t_max, place: TriangleSlot::NONE },
         }
     }
 
     /// The hit that is left.
     #[inline(always)]
-    pub(super) fn found(&self) -> Place {
+    pub(super) fn found(&self) -> TriangleSlot {
         self.best.place
     }
 
     /// Tests the triangles of a leaf, a block, as the ray sees them, and tells whether nothing more can matter.
     #[inline(always)]
-    pub(super) fn test<B: BoxMargins, S: Simd, W: Wave>(
+    pub(super) fn test<B: BoxMargins, S: Simd, W: QueryBatch>(
         &mut self,
         s: S,
         sight: &Sight,
@@ -153,7 +153,7 @@ impl Seeker {
 
     /// Takes what is met of a block, and tells whether nothing more can matter.
     #[inline(always)]
-    pub(super) fn take<B: BoxMargins, W: Wave>(
+    pub(super) fn take<B: BoxMargins, W: QueryBatch>(
         &mut self,
         tree: &Tree,
         shapes: &Shapes,
@@ -166,7 +166,7 @@ impl Seeker {
             let lane = open.trailing_zeros();
             open &= open - 1;
             let at = lane as usize % LANES;
-            let place = Place { block: index, lane, prim: prims[at] };
+            let place = TriangleSlot { block: index, lane, prim: prims[at] };
             let certain = met.hit >> lane & 1 == 1;
             if self.offer(tree, shapes, wave, place, certain.then_some((met.low[at], met.high[at]))) {
                 return true;
@@ -178,12 +178,12 @@ impl Seeker {
 
     /// Takes a triangle that is hit between these distances, or may be hit; and tells whether that is the answer.
     #[inline(always)]
-    fn offer<W: Wave>(
+    fn offer<W: QueryBatch>(
         &mut self,
         tree: &Tree,
         shapes: &Shapes,
         wave: &W,
-        place: Place,
+        place: TriangleSlot,
         between: Option<(f32, f32)>,
     ) -> bool {
         if place.prim == self.exclude {
@@ -195,7 +195,7 @@ impl Seeker {
                 if W::Goal::ANY && !wave.goal(self.number).minds(shapes.opaque.get_or_set(place.prim), place.prim) {
                     return false;
                 }
-                if !W::Goal::ANY && wave.gaps().is_some() && passes(shapes, wave, self.number, place.prim) {
+                if !W::Goal::ANY && wave.filter().is_some() && passes(shapes, wave, self.number, place.prim) {
                     return false;
                 }
                 self.best = Best { low, high, place };
@@ -215,24 +215,24 @@ impl Seeker {
 /// Whether a ray passes a prim that it meets, as one that is not there.
 #[cold]
 #[inline(never)]
-fn passes<W: Wave>(shapes: &Shapes, wave: &W, i: usize, prim: u32) -> bool {
-    !shapes.opaque.get_or_set(prim) && wave.gaps().is_some_and(|gaps| gaps.is_gap(i, prim))
+fn passes<W: QueryBatch>(shapes: &Shapes, wave: &W, i: usize, prim: u32) -> bool {
+    !shapes.opaque.get_or_set(prim) && wave.filter().is_some_and(|filter| filter.rejects(i, prim))
 }
 
 /// Whether a triangle is hit before the best one so far, which was found by intervals, by the exact test; `certain`: it is on
 /// the ray's line. Then where, or a distance of negative infinity where any hit is the answer.
 #[cold]
 #[inline(never)]
-pub(super) fn decide<W: Wave>(
+pub(super) fn decide<W: QueryBatch>(
     tree: &Tree,
     shapes: &Shapes,
     wave: &W,
     i: usize,
     best: Best,
-    place: Place,
+    place: TriangleSlot,
     certain: bool,
 ) -> Option<f32> {
-    let (ray, corners) = (wave.ray(i), Place::corners(tree, place.packed()));
+    let (ray, corners) = (wave.ray(i), TriangleSlot::corners(tree, place.packed()));
     if !certain && !triangle::is_hit(&RaySpace::checked(ray.origin, ray.dir).0, &corners) {
         return None;
     }
@@ -251,7 +251,7 @@ pub(super) fn decide<W: Wave>(
     } else if t > best.high {
         false
     } else {
-        let known = triangle::distance_along(ray.origin, ray.dir, &Place::corners(tree, best.place.packed()));
+        let known = triangle::distance_along(ray.origin, ray.dir, &TriangleSlot::corners(tree, best.place.packed()));
         (t, place.prim) < (known, best.place.prim)
     };
     before.then_some(t)

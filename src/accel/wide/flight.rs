@@ -9,11 +9,11 @@ use std::marker::PhantomData;
 
 use super::best::{Met, Seeker};
 use super::node::{Child, Node, Tree};
-use super::ready::{Ready, ReadyRay};
-use super::settle::Settle;
+use super::pending_hits::PendingHits;
+use super::prepared::{PreparedRay, PreparedRays};
 use super::slabs::BoxMargins;
 use super::walk::{Entry, ask_by_itself};
-use crate::accel::wave::Wave;
+use crate::accel::query_batch::QueryBatch;
 use crate::accel::{Hit, NO_PRIM, Shapes};
 use crate::math::simd::{Kernel, LANES, Order, Simd};
 use bytemuck::Zeroable;
@@ -56,7 +56,7 @@ const fn farthest_first() -> [[Order; 256]; LANES] {
 /// A ray in flight.
 #[derive(Clone, Debug)]
 struct Slot {
-    ray: ReadyRay,
+    ray: PreparedRay,
     seeker: Seeker,
     /// Above the top of its stack.
     top: usize,
@@ -85,7 +85,7 @@ pub(super) struct Flight<'w, W, B> {
 }
 
 /// Slots by the bits of their numbers.
-struct Whereabouts {
+struct SlotMasks {
     nodes: u32,
     leaves: u32,
     ended: u32,
@@ -104,8 +104,8 @@ pub(super) struct Slots {
 impl Default for Slots {
     fn default() -> Self {
         let slot = |_| Slot {
-            ray: ReadyRay::zeroed(),
-            seeker: Seeker::new(&ReadyRay::zeroed(), 0.0, 0, NO_PRIM),
+            ray: PreparedRay::zeroed(),
+            seeker: Seeker::new(&PreparedRay::zeroed(), 0.0, 0, NO_PRIM),
             top: LANES,
             near: [f32::NEG_INFINITY; DEPTH + LANES],
             children: [Child::END; DEPTH + LANES],
@@ -117,13 +117,13 @@ impl Default for Slots {
 impl Slots {
     /// Which of them are where.
     #[inline(always)]
-    fn whereabouts<S: Simd>(&self, s: S) -> Whereabouts {
+    fn whereabouts<S: Simd>(&self, s: S) -> SlotMasks {
         let (mut leaves, mut ended) = (0, 0);
         for (i, at) in self.at.as_chunks().0.iter().enumerate() {
             leaves |= s.high_bits(at) << (LANES * i);
             ended |= s.find_word(Child::END, at) << (LANES * i);
         }
-        Whereabouts { nodes: !leaves & self.taken, leaves: leaves & !ended, ended: ended & self.taken }
+        SlotMasks { nodes: !leaves & self.taken, leaves: leaves & !ended, ended: ended & self.taken }
     }
 
     /// Where a slot is.
@@ -137,18 +137,18 @@ impl Slots {
 /// Rays that wait.
 struct Queue {
     /// The eight that the next one is of.
-    ready: Ready,
+    ready: PreparedRays,
     /// The next one's number in the wave.
     next: usize,
 }
 
-impl<W: Wave, B: BoxMargins> Kernel for InFlight<'_, W, B> {
+impl<W: QueryBatch, B: BoxMargins> Kernel for InFlight<'_, W, B> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let Self { mut flight, slots } = self;
-        let (mut queue, mut settle) = (Queue { ready: Ready::default(), next: 0 }, Settle::default());
+        let (mut queue, mut pending) = (Queue { ready: PreparedRays::default(), next: 0 }, PendingHits::default());
         for number in 0..u32::BITS {
             flight.start(s, slots, number, &mut queue);
         }
@@ -160,11 +160,11 @@ impl<W: Wave, B: BoxMargins> Kernel for InFlight<'_, W, B> {
             nodes = at.nodes;
             if nodes == 0 || (at.leaves | at.ended).count_ones() >= LEAVES {
                 let answered = flight.test(s, slots, at.leaves, &mut met);
-                flight.renew(s, slots, at.ended | answered, &mut queue, &mut settle);
+                flight.renew(s, slots, at.ended | answered, &mut queue, &mut pending);
                 nodes = slots.whereabouts(s).nodes;
             }
         }
-        settle.finish(s, flight.wave);
+        pending.finish(s, flight.wave);
     }
 }
 
@@ -217,7 +217,7 @@ impl Slot {
     }
 }
 
-impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
+impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
     /// Puts the next ray that meets a box of the root into a slot, if there is one; those before it that do not are
     /// answered.
     #[inline(always)]
@@ -312,13 +312,20 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
 
     /// Answers the rays that have ended, and puts new ones in their places.
     #[inline(always)]
-    fn renew<S: Simd>(&mut self, s: S, slots: &mut Slots, mut ended: u32, queue: &mut Queue, settle: &mut Settle) {
+    fn renew<S: Simd>(
+        &mut self,
+        s: S,
+        slots: &mut Slots,
+        mut ended: u32,
+        queue: &mut Queue,
+        pending: &mut PendingHits,
+    ) {
         while ended != 0 {
             let number = ended.trailing_zeros();
             ended &= ended - 1;
             let (slot, at) = slots.at(number);
             *at = Child::END;
-            settle.answer(s, self.tree, self.wave, slot.seeker.number, slot.seeker.found());
+            pending.answer(s, self.tree, self.wave, slot.seeker.number, slot.seeker.found());
             self.start(s, slots, number, queue);
         }
     }

@@ -5,11 +5,11 @@ use std::marker::PhantomData;
 
 use super::slabs::{BoxMargins, Derived};
 use super::walk::Stack;
-use super::{RayOrder, Splitting, Wide};
+use super::{Splitting, TraceMode, Wide};
 use crate::accel::query::{Culling, Goal, Query};
+use crate::accel::query_batch::QueryBatch;
 use crate::accel::tests::scenes::{lattice, mesh, moved, ray, rays, soup};
 use crate::accel::tests::{far_rays, wrong};
-use crate::accel::wave::Wave;
 use crate::accel::{Probe, Ray, RayCounts, Shapes};
 use crate::math::Vec3;
 use crate::math::random::Random;
@@ -37,7 +37,7 @@ impl<B: BoxMargins> Culling for Walked<'_, B> {
         self.wide.walk_within::<B, _, _>(query, stack, probe);
     }
 
-    fn trace<W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
+    fn trace<W: QueryBatch, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
         if self.counted {
             return self.wide.trace_within::<B, _, _>(wave, stack, &mut RayCounts::default());
         }
@@ -72,13 +72,13 @@ impl BoxMargins for AnyCoordinates {
 
 /// Wrong answers of both trees, in every order of the rays and by the walk that counts.
 fn wrong_with<B: BoxMargins>(shapes: &Shapes, rays: &[Ray]) -> usize {
-    let ways = [RayOrder::OneByOne, RayOrder::InFlight, RayOrder::Packets];
+    let ways = [TraceMode::OneByOne, TraceMode::InFlight, TraceMode::Packets];
     let of = |splitting| {
         let of = |way, counted| {
             let wide = Wide::build(shapes, splitting).with_rays(way);
             wrong(&Walked::<B> { wide, counted, margins: PhantomData }, shapes, rays)
         };
-        of(RayOrder::OneByOne, true) + ways.map(|way| of(way, false)).iter().sum::<usize>()
+        of(TraceMode::OneByOne, true) + ways.map(|way| of(way, false)).iter().sum::<usize>()
     };
     of(Splitting::Octree) + of(Splitting::SurfaceArea)
 }

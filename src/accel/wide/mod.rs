@@ -10,38 +10,38 @@
 //! In both, the binary cuts are improved and fused into nodes of eight (`build`). Each prim is listed once, so there is no
 //! mailbox: there would be nothing for it to save.
 //!
-//! Rays go one by one (`alone`), many in flight (`flight`) or sixteen and more side by side (`packet`; those from one place enter by
-//! crowds, `entrance`, and share what they see of blocks, `shelf`), through triangles; where there is anything else, or
-//! somebody counts, they go one by one through whatever there is (`walk`). Hits are ordered by (t, prim) and every test
+//! Rays go one by one (`single`), many in flight (`flight`) or in packets of sixteen and more (`packet`; those from one place have
+//! common entry points, `entry_point`, and share what they see of blocks, `block_cache`), through triangles; where there is
+//! anything else, and in counted runs, they go one by one through whatever there is (`walk`). Hits are ordered by (t, prim) and every test
 //! gives an exact verdict, so that neither the order of visits nor the company of other rays can change an answer.
 //! Counts are those of one ray at a time: whoever listens gets that.
 //!
 //! An object that stands in several places has a tree in its own frame, through which rays go one by one (`placed`).
 
-mod alone;
 mod best;
 mod build;
-mod bundle;
 mod check;
-mod entrance;
+mod entry_point;
 mod flight;
-mod hull;
+mod interval_ray;
 mod listed;
+mod packet_rays;
+mod single;
 // Its kernels are not compiled without vectors.
+mod block_cache;
 #[cfg(all(test, any(target_arch = "x86_64", target_arch = "aarch64")))]
 mod margins;
 mod node;
 mod packet;
 mod padded;
+mod pending_hits;
 mod placed;
-mod ready;
-mod settle;
-mod shelf;
+mod prepared;
 mod slabs;
 pub(super) mod split;
-mod walk;
 #[cfg(test)]
-mod ways;
+mod tests;
+mod walk;
 
 pub(super) use build::ALIKE;
 pub use listed::Listed;
@@ -49,21 +49,21 @@ pub use split::Splitting;
 
 use std::marker::PhantomData;
 
-use self::alone::Alone;
 use self::flight::{DEPTH, Flight, InFlight};
 use self::node::{Arrays, Tree};
 use self::packet::InPackets;
+use self::single::TraceSingle;
 use self::slabs::{BoxMargins, Derived};
 pub(super) use self::walk::Stack;
 use self::walk::{OneByOne, Walk};
 use super::query::{Culling, Goal, Query};
-use super::wave::Wave;
+use super::query_batch::QueryBatch;
 use super::{NoProbe, Probe, Shapes};
 use crate::math::simd::{Kernel, Level, WIDE, portably};
 
 /// How the rays of a wave are traced. The answers are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RayOrder {
+pub enum TraceMode {
     /// Side by side where most rays run alike; else in flight, or one after another where there are few.
     Adaptive,
     /// One after another.
@@ -85,10 +85,10 @@ const ASKED: usize = 32;
 /// Rays from which on it pays to have them in flight.
 const MANY: usize = 2 * WIDE;
 
-impl RayOrder {
+impl TraceMode {
     /// What suits a wave: by how many of the packets that it would make run to one octant, as far as three rays of each of
     /// some tell.
-    fn of<W: Wave>(wave: &W) -> Self {
+    fn of<W: QueryBatch>(wave: &W) -> Self {
         let octant = |i: usize| {
             let dir = wave.ray(i).dir;
             [dir.x, dir.y, dir.z].map(f32::is_sign_negative)
@@ -113,7 +113,7 @@ pub struct Wide<'a> {
     splitting: Splitting,
     arrays: Arrays,
     level: Level,
-    rays: RayOrder,
+    rays: TraceMode,
 }
 
 impl<'a> Wide<'a> {
@@ -129,7 +129,7 @@ impl<'a> Wide<'a> {
             splitting,
             arrays: build::build(shapes, splitting, times),
             level: Level::best(),
-            rays: RayOrder::Adaptive,
+            rays: TraceMode::Adaptive,
         }
     }
 
@@ -141,7 +141,7 @@ impl<'a> Wide<'a> {
 
     /// Traces waves in another way; the answers are the same.
     #[must_use]
-    pub fn with_rays(self, rays: RayOrder) -> Self {
+    pub fn with_rays(self, rays: TraceMode) -> Self {
         Self { rays, ..self }
     }
 
@@ -189,7 +189,7 @@ impl Culling for Wide<'_> {
         self.walk_within::<Derived, _, _>(query, stack, probe);
     }
 
-    fn trace<W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
+    fn trace<W: QueryBatch, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
         self.trace_within::<Derived, _, _>(wave, stack, probe);
     }
 }
@@ -197,7 +197,7 @@ impl Culling for Wide<'_> {
 /// Whether rays may be asked in any way that gives the same answers: nobody counts, and the test is exact.
 struct Together<W, P>(PhantomData<(W, P)>);
 
-impl<W: Wave, P: Probe> Together<W, P> {
+impl<W: QueryBatch, P: Probe> Together<W, P> {
     const MAY: bool = P::SILENT && W::Goal::EXACT;
     /// Whether it is worth code for every instruction set.
     const ON_EVERY_LEVEL: bool = P::SILENT || P::OF_PICTURES && W::Goal::EXACT;
@@ -205,7 +205,7 @@ impl<W: Wave, P: Probe> Together<W, P> {
 
 impl Wide<'_> {
     /// Traces a wave by given margins.
-    fn trace_within<B: BoxMargins, W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
+    fn trace_within<B: BoxMargins, W: QueryBatch, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
         // Where it is false nothing is compiled for it.
         if Together::<W, P>::MAY {
             return self.trace_together::<B, _>(wave, stack);
@@ -215,24 +215,24 @@ impl Wide<'_> {
         if Together::<W, P>::ON_EVERY_LEVEL { self.run_narrow::<B, _>(kernel) } else { portably(kernel) }
     }
 
-    fn trace_together<B: BoxMargins, W: Wave>(&self, wave: &mut W, stack: &mut Stack) {
+    fn trace_together<B: BoxMargins, W: QueryBatch>(&self, wave: &mut W, stack: &mut Stack) {
         let (tree, shapes, margins) = (&self.tree(), self.shapes, PhantomData::<B>);
         if !shapes.planes.is_empty() || !tree.runs.is_empty() || tree.nodes.is_empty() {
             return self.run::<B, _>(OneByOne { tree, shapes, wave, stack, probe: &mut NoProbe, margins });
         }
-        let Stack { entries, branches, slots, shelf } = stack;
-        let rays = if self.rays == RayOrder::Adaptive { RayOrder::of(wave) } else { self.rays };
+        let Stack { entries, branches, slots, cache } = stack;
+        let rays = if self.rays == TraceMode::Adaptive { TraceMode::of(wave) } else { self.rays };
         match rays {
-            RayOrder::Packets => {
-                self.run::<B, _>(InPackets { tree, shapes, wave, stack: branches, shelf, entries, margins });
+            TraceMode::Packets => {
+                self.run::<B, _>(InPackets { tree, shapes, wave, stack: branches, cache, entries, margins });
             }
-            RayOrder::InFlight if tree.most_behind() < DEPTH => {
+            TraceMode::InFlight if tree.most_behind() < DEPTH => {
                 let flight = Flight { tree, far: tree.bytes() > NEAR, shapes, wave, entries, margins };
                 // Eight lanes are all it has a use for: with AVX-512's masks it was 4 to 8 % slower on the one processor where
                 // both were measured.
                 self.run_narrow::<B, _>(InFlight { flight, slots });
             }
-            _ => self.run::<B, _>(Alone { tree, shapes, wave, stack: entries, margins }),
+            _ => self.run::<B, _>(TraceSingle { tree, shapes, wave, stack: entries, margins }),
         }
     }
 }

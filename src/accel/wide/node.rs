@@ -1,6 +1,6 @@
 //! Nodes, blocks and runs as flat arrays.
 
-use crate::accel::probe::{Extent, Place, Visit};
+use crate::accel::probe::{Extent, NodeId, Visit};
 use crate::accel::{NO_PRIM, Shapes};
 use crate::math::aabb::Aabb;
 use crate::math::simd::{LANES, Row};
@@ -64,8 +64,8 @@ impl Child {
     pub(super) const NOTHING: u32 = Self::LEAF;
     /// No child, packed: the end of a stack. The last run there could be, which no tree has.
     pub(super) const END: u32 = u32::MAX;
-    /// The entrance of packets, packed: the last node there could be, which no tree has.
-    pub(super) const ENTRANCE: u32 = Self::LEAF - 1;
+    /// The entry point of packets, packed: the last node there could be, which no tree has.
+    pub(super) const ENTRY_POINT: u32 = Self::LEAF - 1;
     const LEAF: u32 = 1 << 31;
     const COUNT: u32 = 27;
     /// The most blocks, and the most runs, of a tree: [`Self::END`] would be one more.
@@ -230,10 +230,10 @@ impl<'a> Tree<'a> {
         let (place, (bounds, listed)) = match Child::unpack(child) {
             Child::Node(i) => {
                 let node = &self.nodes[i as usize];
-                (Place::Node(i), ((0..LANES).fold(Aabb::EMPTY, |b, slot| b.union(node.bounds(slot))), None))
+                (NodeId::Node(i), ((0..LANES).fold(Aabb::EMPTY, |b, slot| b.union(node.bounds(slot))), None))
             }
-            Child::Block(i, count) => (Place::Block(i), around(&self.blocks[i as usize].prims[..count as usize])),
-            Child::Run(i) => (Place::Run(i), around(self.run(i))),
+            Child::Block(i, count) => (NodeId::Block(i), around(&self.blocks[i as usize].prims[..count as usize])),
+            Child::Run(i) => (NodeId::Run(i), around(self.run(i))),
         };
         Visit { place, extent: Extent::Box(bounds), listed }
     }

@@ -1,11 +1,11 @@
 //! Sixteen or thirty-two rays side by side: rays that run alike visit the same nodes, which are read and ordered once for all.
 //!
-//! A node's boxes are first asked about all rays at once, by a hull of origins and reciprocals of directions (after
+//! A node's boxes are first asked about all rays at once, by a interval of origins and reciprocals of directions (after
 //! S. Boulos et al., *Packet-based Whitted and Distribution Ray Tracing*, 2007); of several boxes that are left each is asked
-//! about each ray. At a leaf the triangles' own boxes are asked about the hull, and what is left is tested against all rays
+//! about each ray. At a leaf the triangles' own boxes are asked about the interval, and what is left is tested against all rays
 //! at once. Best hits are known by intervals, as in `best`; exact distances are found at the end, those of all rays
 //! together. What rays from one place see of a block is found once for all packets that visit it one soon after the other
-//! (`shelf`).
+//! (`cache`).
 //!
 //! What a packet waits for is mostly itself: each test decides which is next. So thirty-two rays, where there are registers
 //! for them, take little more time than sixteen, as long as they stay together; where less than half of them visit what the
@@ -15,18 +15,18 @@
 
 use std::marker::PhantomData;
 
-use super::alone::Lone;
-use super::best::{Best, Place, decide};
-use super::bundle::{Bundle, all};
-use super::entrance::{CROWD, Entrance, State};
+use super::best::{Best, TriangleSlot, decide};
+use super::block_cache::BlockCache;
+use super::entry_point::{EntryPoint, GROUP, State};
 use super::flight::FARTHEST_FIRST;
 use super::node::{Block, Child, Node, Tree};
-use super::shelf::Shelf;
+use super::packet_rays::{PacketRays, all};
+use super::single::SingleRays;
 use super::slabs::BoxMargins;
 use super::walk::Entry;
-use crate::accel::holes::those;
+use crate::accel::filter::those;
 use crate::accel::query::Goal;
-use crate::accel::wave::{Pencil, Wave};
+use crate::accel::query_batch::{Pencil, QueryBatch};
 use crate::accel::{Hit, NO_PRIM, Ray, Shapes};
 use crate::math::Vec3;
 use crate::math::fan::Fan;
@@ -51,7 +51,7 @@ const PATIENCE: usize = 8;
 
 /// A child still to be visited.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Branch {
+pub(super) struct StackEntry {
     /// No ray enters its box before this distance.
     near: f32,
     child: u32,
@@ -64,29 +64,29 @@ pub(super) struct InPackets<'w, W, B> {
     pub tree: &'w Tree<'w>,
     pub shapes: &'w Shapes,
     pub wave: &'w mut W,
-    pub stack: &'w mut [Branch],
-    pub shelf: &'w mut Shelf,
+    pub stack: &'w mut [StackEntry],
+    pub cache: &'w mut BlockCache,
     /// For rays that go by themselves.
     pub entries: &'w mut [Entry],
     pub margins: PhantomData<B>,
 }
 
 /// What packets are traced through, and who takes their answers.
-struct Trip<'w, W> {
+struct PacketTrace<'w, W> {
     tree: &'w Tree<'w>,
     shapes: &'w Shapes,
     wave: &'w mut W,
-    stack: &'w mut [Branch],
-    shelf: &'w mut Shelf,
+    stack: &'w mut [StackEntry],
+    cache: &'w mut BlockCache,
     entries: &'w mut [Entry],
-    entrance: Entrance,
-    lone: Lone,
+    entry_point: EntryPoint,
+    lone: SingleRays,
 }
 
 /// `N` rays that run alike.
 #[repr(C, align(64))]
 struct Packet<B, const N: usize> {
-    rays: Bundle<B, N>,
+    rays: PacketRays<B, N>,
     found: Found<N>,
     /// Where their ranges end.
     t_max: [f32; N],
@@ -126,36 +126,36 @@ enum Seen<T: Lanewise<N>, const N: usize> {
 
 /// How many rays visit the nodes and leaves of packets together.
 #[derive(Clone, Copy, Debug, Default)]
-struct Company {
+struct Occupancy {
     visits: u32,
     /// Rays that visit them, summed.
     rays: u32,
 }
 
-impl<W: Wave, B: BoxMargins> Kernel for InPackets<'_, W, B> {
+impl<W: QueryBatch, B: BoxMargins> Kernel for InPackets<'_, W, B> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { tree, shapes, wave, stack, shelf, entries, .. } = self;
+        let Self { tree, shapes, wave, stack, cache, entries, .. } = self;
         let (mut narrow, mut broad) = (Packet::<B, WIDE>::empty(), Packet::<B, BROAD>::empty());
         if let Some(Pencil { origin, .. }) = wave.pencil() {
             broad.start_at(origin);
             narrow.start_at(origin);
         }
-        shelf.clear();
-        let (entrance, lone) = (Entrance::new(), Lone::default());
-        let mut trip = Trip { tree, shapes, wave, stack, shelf, entries, entrance, lone };
+        cache.clear();
+        let (entry_point, lone) = (EntryPoint::new(), SingleRays::default());
+        let mut trip = PacketTrace { tree, shapes, wave, stack, cache, entries, entry_point, lone };
         let (count, mut start) = (trip.wave.rays().len(), 0);
         let (mut apart, mut patience) = (0_usize, PATIENCE);
         while start < count {
             if let Some(pencil) = trip.wave.pencil()
-                && trip.entrance.is_passed(start)
+                && trip.entry_point.is_passed(start)
             {
-                trip.entrance.find::<B, _>(s, tree, &pencil, start);
-                if trip.entrance.state == State::Closed {
-                    trip.wave.take_all(start, &[Hit::MISS; CROWD]);
-                    start += CROWD;
+                trip.entry_point.find::<B, _>(s, tree, &pencil, start);
+                if trip.entry_point.state == State::Closed {
+                    trip.wave.take_all(start, &[Hit::MISS; GROUP]);
+                    start += GROUP;
                     continue;
                 }
             }
@@ -178,7 +178,7 @@ impl<W: Wave, B: BoxMargins> Kernel for InPackets<'_, W, B> {
     }
 }
 
-impl Company {
+impl Occupancy {
     /// Whether half of `N` rays and more visit what they visit, on the average: then they are better off together than in
     /// halves.
     fn is_close<const N: usize>(self) -> bool {
@@ -190,7 +190,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     fn empty() -> Self {
         Self {
             start: 0,
-            rays: Bundle::empty(),
+            rays: PacketRays::empty(),
             found: Found { prim: [NO_PRIM; N], place: [0; N] },
             t_max: [0.0; N],
             active: 0,
@@ -205,8 +205,14 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
 
     /// Answers the rays that were taken, or as many as there are: those of a mask together.
     #[inline(always)]
-    fn pass<S: Simd, T: Lanewise<N>, W: Wave>(&mut self, s: S, wide: T, trip: &mut Trip<W>, alike: u32) -> Company {
-        let company = if alike == 0 { Company::default() } else { self.trace(s, wide, alike, trip) };
+    fn pass<S: Simd, T: Lanewise<N>, W: QueryBatch>(
+        &mut self,
+        s: S,
+        wide: T,
+        trip: &mut PacketTrace<W>,
+        alike: u32,
+    ) -> Occupancy {
+        let company = if alike == 0 { Occupancy::default() } else { self.trace(s, wide, alike, trip) };
         let (mut apart, count) = (all::<N>() & !alike, trip.wave.rays().len());
         for start in (self.start..count.min(self.start + N)).step_by(LANES) {
             if apart & all::<LANES>() != 0 {
@@ -219,7 +225,13 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
 
     /// Takes the rays from `start` on, if there are as many, and tells which of them run alike.
     #[inline(always)]
-    fn gather<S: Simd, T: Lanewise<N>, W: Wave>(&mut self, s: S, wide: T, trip: &Trip<W>, start: usize) -> u32 {
+    fn gather<S: Simd, T: Lanewise<N>, W: QueryBatch>(
+        &mut self,
+        s: S,
+        wide: T,
+        trip: &PacketTrace<W>,
+        start: usize,
+    ) -> u32 {
         self.start = start;
         if let Some(Pencil { dirs, .. }) = trip.wave.pencil() {
             return if self.rays.turn(dirs, start) { self.rays.prepare(wide, trip.tree, &self.t_max) } else { 0 };
@@ -236,8 +248,14 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
 
     /// From the root to every leaf that any of these rays may hit. The others get an answer, too, which means nothing.
     #[inline(always)]
-    fn trace<S: Simd, T: Lanewise<N>, W: Wave>(&mut self, s: S, wide: T, alike: u32, trip: &mut Trip<W>) -> Company {
-        let (tree, mut company) = (trip.tree, Company::default());
+    fn trace<S: Simd, T: Lanewise<N>, W: QueryBatch>(
+        &mut self,
+        s: S,
+        wide: T,
+        alike: u32,
+        trip: &mut PacketTrace<W>,
+    ) -> Occupancy {
+        let (tree, mut company) = (trip.tree, Occupancy::default());
         if alike != all::<N>() {
             self.rays.fill(wide, alike, &mut self.t_max);
         }
@@ -258,7 +276,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let (rays, per_length) = (&self.rays, self.rays.per_length());
         let sight = match rays.common {
             Some(from) => {
-                trip.shelf.sit((from, rays.z, rays.octant));
+                trip.cache.sit((from, rays.z, rays.octant));
                 Seen::Together(Fan::new(wide, from, &rays.dir, rays.z, per_length))
             }
             None => Seen::Apart(RowSight::new(wide, &rays.origin, &rays.dir, rays.z, per_length)),
@@ -267,7 +285,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let limit = wide.choose(self.active, limit, wide.splat(f32::NEG_INFINITY));
         let mut reach: Reach<T, N> = Reach { low, high, limit, farthest: wide.latest(limit) };
         let (mut top, mut branch) =
-            (0, Branch { near: 0.0, child: trip.entrance.of(self.start, N), rays: self.active });
+            (0, StackEntry { near: 0.0, child: trip.entry_point.of(self.start, N), rays: self.active });
         loop {
             let mut nearer = false;
             company.visits += 1;
@@ -279,8 +297,8 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
                 }
             } else {
                 let below = top;
-                // The entrance is no node of the tree.
-                let node = tree.nodes.get(branch.child as usize).unwrap_or(&trip.entrance.node);
+                // The entry point is no node of the tree.
+                let node = tree.nodes.get(branch.child as usize).unwrap_or(&trip.entry_point.node);
                 self.push(s, wide, (tree, node), branch.rays, &reach, (trip.stack, &mut top));
                 nearer = top > below;
             }
@@ -297,12 +315,12 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
 
     /// Tests a leaf.
     #[inline(always)]
-    fn visit<S: Simd, T: Lanewise<N>, W: Wave>(
+    fn visit<S: Simd, T: Lanewise<N>, W: QueryBatch>(
         &mut self,
         s: S,
         wide: T,
-        trip: &mut Trip<W>,
-        branch: Branch,
+        trip: &mut PacketTrace<W>,
+        branch: StackEntry,
         reach: &mut Reach<T, N>,
         sight: &Seen<T, N>,
     ) {
@@ -328,7 +346,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         (tree, node): (&Tree, &Node),
         rays: u32,
         reach: &Reach<T, N>,
-        (stack, top): (&mut [Branch], &mut usize),
+        (stack, top): (&mut [StackEntry], &mut usize),
     ) {
         let bundle = &self.rays;
         let (near, met) = bundle.meets_any(s, &node.planes, reach.farthest);
@@ -346,19 +364,19 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             s.prefetch_either(Child::is_leaf(child), (tree.blocks, block), (tree.nodes, at));
             // The only one is visited for the rays that visit the node: mostly there are some for it.
             let met = if only { rays } else { bundle.meet_child(wide, node, slot, reach.limit) & rays };
-            stack[*top] = Branch { near: near[slot], child, rays: met };
+            stack[*top] = StackEntry { near: near[slot], child, rays: met };
             *top += usize::from(met != 0);
         }
     }
 
     /// Tests the triangles of a block, and tells which rays have new hits.
     #[inline(always)]
-    fn test<S: Simd, T: Lanewise<N>, W: Wave>(
+    fn test<S: Simd, T: Lanewise<N>, W: QueryBatch>(
         &mut self,
         s: S,
         wide: T,
-        trip: &mut Trip<W>,
-        branch: Branch,
+        trip: &mut PacketTrace<W>,
+        branch: StackEntry,
         reach: &mut Reach<T, N>,
         sight: &Seen<T, N>,
     ) -> u32 {
@@ -367,8 +385,8 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let used = (1 << count) - 1;
         match sight {
             Seen::Together(fan) => {
-                let place = trip.shelf.place(s, (index, block), fan);
-                let kept = trip.shelf.at(place);
+                let place = trip.cache.place(s, (index, block), fan);
+                let kept = trip.cache.at(place);
                 let lanes = self.rays.meets_any(s, &kept.planes, reach.farthest).1 & used;
                 self.test_each(wide, trip, (block, index, lanes), branch.rays, reach, (fan, &kept.ready))
             }
@@ -385,10 +403,10 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
 
     /// Tests the triangles of a mask, and tells which of the rays have new hits.
     #[inline(always)]
-    fn test_each<T: Lanewise<N>, W: Wave, R: Rows<T, N>>(
+    fn test_each<T: Lanewise<N>, W: QueryBatch, R: Rows<T, N>>(
         &mut self,
         wide: T,
-        trip: &Trip<W>,
+        trip: &PacketTrace<W>,
         (block, index, lanes): (&Block, u32, u32),
         mut rays: u32,
         reach: &mut Reach<T, N>,
@@ -400,7 +418,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             lanes &= lanes - 1;
             let (verdicts, look) = sight.look(wide, ready, lane as usize);
             if (verdicts.hit | verdicts.unsure) & rays != 0 {
-                let place = Place { block: index, lane, prim: block.prims[lane as usize % LANES] };
+                let place = TriangleSlot { block: index, lane, prim: block.prims[lane as usize % LANES] };
                 let between = sight.distances(wide, ready, lane as usize, &look);
                 let hit = self.take(wide, trip, (place, rays), verdicts, between, reach);
                 changed |= hit;
@@ -415,11 +433,11 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     /// Offers the hits of rays with a triangle, between two distances where they are certain; which of them are the best
     /// now.
     #[inline(always)]
-    fn take<T: Lanewise<N>, W: Wave>(
+    fn take<T: Lanewise<N>, W: QueryBatch>(
         &mut self,
         s: T,
-        trip: &Trip<W>,
-        (place, rays): (Place, u32),
+        trip: &PacketTrace<W>,
+        (place, rays): (TriangleSlot, u32),
         verdicts: Verdicts,
         [low, high]: [T::Lanes; 2],
         reach: &mut Reach<T, N>,
@@ -433,7 +451,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let (mut hit, unsure) = (verdicts.hit & rays, verdicts.unsure & rays);
         let t_min = s.load(&self.rays.t_min);
         let mut better = s.less(t_min, low) & s.less(high, reach.low) & s.at_most(high, reach.high) & hit;
-        if !W::Goal::ANY && better != 0 && trip.wave.gaps().is_some() {
+        if !W::Goal::ANY && better != 0 && trip.wave.filter().is_some() {
             let gone = self.passing(trip.shapes, trip.wave, prim, better);
             (better, hit) = (better & !gone, hit & !gone);
         }
@@ -456,7 +474,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
                 let best = Best {
                     low: low[ray],
                     high: high[ray],
-                    place: Place::unpacked(self.found.place[ray], self.found.prim[ray]),
+                    place: TriangleSlot::unpacked(self.found.place[ray], self.found.prim[ray]),
                 };
                 if let Some(t) = decide(trip.tree, trip.shapes, &*trip.wave, i, best, place, certain) {
                     (low[ray], high[ray]) = (t, t);
@@ -472,15 +490,15 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     /// The rays of a mask that pass a prim that they meet, as one that is not there.
     #[cold]
     #[inline(never)]
-    fn passing<W: Wave>(&self, shapes: &Shapes, wave: &W, prim: u32, rays: u32) -> u32 {
+    fn passing<W: QueryBatch>(&self, shapes: &Shapes, wave: &W, prim: u32, rays: u32) -> u32 {
         let open = !shapes.opaque.get_or_set(prim);
-        wave.gaps().filter(|_| open).map_or(0, |gaps| gaps.gaps(self.start, rays, prim))
+        wave.filter().filter(|_| open).map_or(0, |filter| filter.rejects_of(self.start, rays, prim))
     }
 
     /// The rays of a mask that mind being hit by a prim that is not opaque.
     #[cold]
     #[inline(never)]
-    fn minding<W: Wave>(&self, wave: &W, prim: u32, rays: u32) -> u32 {
+    fn minding<W: QueryBatch>(&self, wave: &W, prim: u32, rays: u32) -> u32 {
         those(rays, |ray| wave.goal(self.start + ray).minds(false, prim))
     }
 
@@ -492,7 +510,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             let place = self.found.place[left.trailing_zeros() as usize % N];
             let mine = s.find_word(place, &self.found.place);
             left &= !mine;
-            let (rows, lane) = Place::rows(tree, place);
+            let (rows, lane) = TriangleSlot::rows(tree, place);
             for (corner, rows) in corners.iter_mut().zip(rows) {
                 for k in 0..3 {
                     corner[k] = s.choose(mine, s.splat(rows[k][lane]), corner[k]);
@@ -505,7 +523,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
 
     /// Gives the answers, all distances and weights together.
     #[inline(always)]
-    fn answer<S: Simd, T: Lanewise<N>, W: Wave>(&mut self, s: S, wide: T, trip: &mut Trip<W>) {
+    fn answer<S: Simd, T: Lanewise<N>, W: QueryBatch>(&mut self, s: S, wide: T, trip: &mut PacketTrace<W>) {
         let (start, found, tree) = (self.start, &self.found, trip.tree);
         if W::Goal::ANY {
             trip.wave.take_all(start, &found.prim.map(|prim| Hit { prim, ..Hit::MISS }));
@@ -519,7 +537,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let place = found.place[hit.trailing_zeros() as usize % N];
         let Meetings { t, weights: [u, v], sure } = if hit & !wide.find_word(place, &found.place) == 0 {
             let bounds = self.rays.row_bounds();
-            Plane::of(&Place::corners(tree, place)).meet(wide, &self.rays.origin, &self.rays.dir, &bounds)
+            Plane::of(&TriangleSlot::corners(tree, place)).meet(wide, &self.rays.origin, &self.rays.dir, &bounds)
         } else {
             self.meet_each(wide, tree, hit)
         };
@@ -531,7 +549,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             let ray = unsure.trailing_zeros() as usize % N;
             unsure &= unsure - 1;
             let Ray { origin, dir, .. } = trip.wave.ray(start + ray);
-            let corners = Place::corners(tree, found.place[ray]);
+            let corners = TriangleSlot::corners(tree, found.place[ray]);
             (t[ray], u[ray], v[ray]) = triangle::place(&RaySpace::checked(origin, dir).0, &corners);
         }
         for (k, prim) in found.prim.as_chunks::<LANES>().0.iter().enumerate() {
@@ -548,7 +566,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
 fn drop_unneeded<T: Lanewise<N>, const N: usize>(
     wide: T,
     reach: &Reach<T, N>,
-    stack: &mut [Branch],
+    stack: &mut [StackEntry],
     top: &mut usize,
 ) -> bool {
     while *top > 0 {

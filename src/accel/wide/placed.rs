@@ -1,6 +1,6 @@
 //! The way of a ray through the tree of an object that stands somewhere in the scene.
 //!
-//! Boxes are asked in the object's frame, triangles in the scene's: [`Place`] says why no hit is lost.
+//! Boxes are asked in the object's frame, triangles in the scene's: [`ObjectTransform`] says why no hit is lost.
 
 use super::node::{Block, Child, Tree};
 use super::padded::PaddedSlabs;
@@ -8,8 +8,8 @@ use super::slabs::{BoxMargins, Derived};
 use super::walk::{Entry, Stack, nearest, pop};
 use super::{Culling, Wide};
 use crate::accel::Probe;
-use crate::accel::instances::Place;
-use crate::accel::probe::{Extent, Place as At, Visit};
+use crate::accel::instances::ObjectTransform;
+use crate::accel::probe::{Extent, NodeId, Visit};
 use crate::accel::query::{Goal, Query};
 use crate::math::bounds::{BOX_RANGE, PARALLEL, PLACED_DRIFT, PLACED_PAD};
 use crate::math::shear::RaySpace;
@@ -22,7 +22,7 @@ impl Wide<'_> {
     /// or not a triangle is wanted.
     pub(in crate::accel) fn walk_placed<G: Goal, P: Probe>(
         &self,
-        place: &Place,
+        place: &ObjectTransform,
         first: u32,
         query: &mut Query<G>,
         stack: &mut Stack,
@@ -41,8 +41,8 @@ impl Wide<'_> {
                 other => *other,
             };
             let at = match visit.place {
-                At::Block(block) => At::PlacedBlock(first, block),
-                At::Node(node) => At::PlacedNode(first, node),
+                NodeId::Block(block) => NodeId::PlacedBlock(first, block),
+                NodeId::Node(node) => NodeId::PlacedNode(first, node),
                 other => other,
             };
             Visit { place: at, extent, ..visit }
@@ -54,13 +54,13 @@ impl Wide<'_> {
 /// Where an object stands, and what its triangles are called there.
 #[derive(Clone, Copy)]
 struct Spot<'w> {
-    place: &'w Place,
+    place: &'w ObjectTransform,
     first: u32,
 }
 
 /// The padded boxes of an object's tree as a ray of the scene meets them; `None` for one with numbers that are too large
 /// or too small there.
-fn slabs_of(tree: &Tree, place: &Place, ray: &RaySpace, t_min: f32) -> Option<PaddedSlabs> {
+fn slabs_of(tree: &Tree, place: &ObjectTransform, ray: &RaySpace, t_min: f32) -> Option<PaddedSlabs> {
     let (origin, dir) = (place.carried(ray.origin).as_vec3(), place.carried_dir(ray.dir).as_vec3());
     let (far, size) = (origin.abs(), dir.abs());
     let extent = tree.extent + place.room.max_element();

@@ -2,13 +2,13 @@
 
 use std::marker::PhantomData;
 
+use super::block_cache::BlockCache;
 use super::flight::Slots;
 use super::node::{Child, Node, Tree};
-use super::packet::Branch;
-use super::shelf::Shelf;
+use super::packet::StackEntry;
 use super::slabs::{BoxMargins, Slabs};
 use crate::accel::query::{Goal, Query};
-use crate::accel::wave::{Wave, begin, end};
+use crate::accel::query_batch::{QueryBatch, begin, end};
 use crate::accel::{Hit, Intersector, NoProbe, Probe, Shapes};
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, LANES, Portable, Simd};
@@ -27,8 +27,8 @@ pub struct Stack {
     /// Of one ray.
     pub(super) entries: Vec<Entry>,
     /// Of a packet.
-    pub(super) branches: Vec<Branch>,
-    pub(super) shelf: Shelf,
+    pub(super) branches: Vec<StackEntry>,
+    pub(super) cache: BlockCache,
     /// Of many rays.
     pub(super) slots: Slots,
 }
@@ -42,7 +42,7 @@ impl Stack {
     /// For walks down `tree`.
     pub(super) fn new(tree: &Tree) -> Self {
         let most = tree.most_behind();
-        Self { entries: vec![Entry::default(); most], branches: vec![Branch::default(); most], ..Self::default() }
+        Self { entries: vec![Entry::default(); most], branches: vec![StackEntry::default(); most], ..Self::default() }
     }
 }
 
@@ -56,7 +56,7 @@ pub(super) struct OneByOne<'w, W, P, B> {
     pub margins: PhantomData<B>,
 }
 
-impl<W: Wave, P: Probe, B: BoxMargins> Kernel for OneByOne<'_, W, P, B> {
+impl<W: QueryBatch, P: Probe, B: BoxMargins> Kernel for OneByOne<'_, W, P, B> {
     type Output = ();
 
     #[inline(always)]
@@ -100,7 +100,7 @@ fn has_direction(dir: Vec3) -> bool {
 /// A ray that padded boxes cannot be asked about. Such rays are rare: code for one instruction set will do.
 #[cold]
 #[inline(never)]
-pub(super) fn ask_by_itself<B: BoxMargins, W: Wave>(
+pub(super) fn ask_by_itself<B: BoxMargins, W: QueryBatch>(
     tree: &Tree,
     shapes: &Shapes,
     wave: &mut W,
@@ -112,7 +112,7 @@ pub(super) fn ask_by_itself<B: BoxMargins, W: Wave>(
 
 /// A ray that goes its own way through whatever there is.
 #[inline(always)]
-fn ask<B: BoxMargins, S: Simd, W: Wave, P: Probe>(
+fn ask<B: BoxMargins, S: Simd, W: QueryBatch, P: Probe>(
     s: S,
     tree: &Tree,
     shapes: &Shapes,

@@ -88,7 +88,7 @@ pub struct Rays {
     pub class: Class,
     /// Asked by the picture.
     pub asked: u64,
-    /// Kept and measured.
+    /// InstancedObjects and measured.
     pub kept: usize,
 }
 

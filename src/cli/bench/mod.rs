@@ -179,7 +179,7 @@ fn head(prepared: &Prepared, name: &str, plan: &Plan, (sets, depth): (&[RaySet],
         hash: prepared.loaded.facts.hash,
         prims: world.len(),
         objects: world.objects(),
-        kept: world.kept.placed().len(),
+        kept: world.instanced.placed().len(),
         auto: plan.sweep.is_none().then(|| world.judged()),
         width: settings.width,
         height: settings.height,
@@ -300,7 +300,7 @@ impl Bench<'_> {
 
     /// The same plan for those of its structures that can keep instances, where these are kept.
     fn able(&self, plan: Plan, prepared: &Prepared, name: &str, left_out: &mut Vec<AccelKind>) -> Result<Plan, Exit> {
-        if prepared.world.kept.is_empty() {
+        if prepared.world.instanced.is_empty() {
             return Ok(plan);
         }
         let (kinds, others): (Vec<AccelKind>, Vec<AccelKind>) =

@@ -37,7 +37,7 @@ impl<'a> Report<'a> {
     pub(super) fn new(file: &'a Path, loaded: &'a Loaded, world: World, limit: u64) -> Self {
         let scene = &loaded.scene;
         let topology = match World::flattened_bytes(scene) <= limit {
-            true if world.kept.is_empty() => Topology::of(scene, &world),
+            true if world.instanced.is_empty() => Topology::of(scene, &world),
             true => Topology::of(scene, &World::new(scene)),
             false => Topology::by_object(scene, &world),
         };
@@ -352,7 +352,7 @@ mod tests {
         let placed = |world_from_object| Instance { name: String::new(), mesh: 0, world_from_object };
         loaded.scene.instances = places.map(placed).collect();
         let [whole, by_object] = [u64::MAX, 1 << 20].map(|limit| report(&loaded, limit));
-        assert!(!whole.world.kept.is_empty(), "kept once");
+        assert!(!whole.world.instanced.is_empty(), "kept once");
         assert_eq!(whole.world.triangles() as usize, 40 * triangles);
         assert_eq!(by_object.topology, Topology { by_object: true, ..whole.topology });
         assert!(whole.topology.edges > 0 && by_object.text().contains("each instance by itself"));

@@ -27,13 +27,13 @@ pub(super) struct Topology {
 impl Topology {
     /// Looks at what is stored alone: of scenes that would take too much memory were each instance stored by itself.
     pub(super) fn by_object(scene: &Scene, world: &World) -> Self {
-        let mut times = vec![0; world.kept.objects().len()];
-        let placed = world.kept.placed().iter().filter(|placed| !is_wire(scene, world, placed.first));
+        let mut times = vec![0; world.instanced.objects().len()];
+        let placed = world.instanced.placed().iter().filter(|placed| !is_wire(scene, world, placed.first));
         placed.for_each(|placed| times[placed.object as usize] += 1);
-        let objects = world.kept.objects().iter().zip(times).filter(|(_, times)| *times > 0);
+        let objects = world.instanced.objects().iter().zip(times).filter(|(_, times)| *times > 0);
         let objects = objects.map(|(object, times)| Self::of_faces(object.shapes(), |_| true).times(times));
         // Beside what is kept once, what is stored has other numbers.
-        let stored = match world.kept.is_empty() {
+        let stored = match world.instanced.is_empty() {
             true => Self::of(scene, world),
             false => Self::of_faces(&world.shapes, |_| true),
         };

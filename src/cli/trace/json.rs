@@ -2,7 +2,7 @@
 
 use super::Told;
 use super::words::{in_world, inside, light, object, place};
-use crate::accel::probe::{Extent, Place, Test, Visit};
+use crate::accel::probe::{Extent, NodeId, Test, Visit};
 use crate::accel::{Hit, RayCounts};
 use crate::number::hash;
 use crate::render::Question;
@@ -108,17 +108,17 @@ fn step(told: &Told, query: &Query, event: &Event) -> Value {
 
 fn visit(told: &Told, query: &Query, visit: &Visit) -> Value {
     let (what, at) = match visit.place {
-        Place::Cell(cell) => ("cell", json!(cell)),
-        Place::OctreeNode(at, level) => ("octree node", json!([at[0], at[1], at[2], level])),
-        Place::Octant(at, level) => ("octant", json!([at[0], at[1], at[2], level])),
-        Place::Node(i) => ("node", json!(i)),
-        Place::Leaf(i) => ("leaf", json!(i)),
-        Place::Block(i) => ("block", json!(i)),
-        Place::Run(i) => ("run", json!(i)),
-        Place::Places(i) => ("places", json!(i)),
-        Place::PlacedNode(first, i) => ("placed node", json!([first, i])),
-        Place::PlacedBlock(first, i) => ("placed block", json!([first, i])),
-        Place::Object(i) => ("object", json!(i)),
+        NodeId::Cell(cell) => ("cell", json!(cell)),
+        NodeId::OctreeNode(at, level) => ("octree node", json!([at[0], at[1], at[2], level])),
+        NodeId::Octant(at, level) => ("octant", json!([at[0], at[1], at[2], level])),
+        NodeId::Node(i) => ("node", json!(i)),
+        NodeId::Leaf(i) => ("leaf", json!(i)),
+        NodeId::Block(i) => ("block", json!(i)),
+        NodeId::Run(i) => ("run", json!(i)),
+        NodeId::Places(i) => ("places", json!(i)),
+        NodeId::PlacedNode(first, i) => ("placed node", json!([first, i])),
+        NodeId::PlacedBlock(first, i) => ("placed block", json!([first, i])),
+        NodeId::Object(i) => ("object", json!(i)),
     };
     let bounds = visit.extent.bounds();
     let corner = |p| in_world(told.world, p).to_array();

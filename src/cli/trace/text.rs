@@ -2,7 +2,7 @@
 
 use super::Told;
 use super::words::{goes_on, in_world, inside, light, object, place};
-use crate::accel::probe::{Extent, Outcome, Place, Visit};
+use crate::accel::probe::{Extent, NodeId, Outcome, Visit};
 use crate::math::{DVec3, Vec3};
 use crate::number::grouped;
 use crate::render::Question;
@@ -103,17 +103,17 @@ fn steps(told: &Told, query: &Query) -> Vec<String> {
 fn visit(told: &Told, query: &Query, visit: &Visit) -> String {
     let numbers = |n: [u32; 3]| format!("{} {} {}", n[0], n[1], n[2]);
     let what = match visit.place {
-        Place::Cell(cell) => format!("cell {}", numbers(cell)),
-        Place::OctreeNode(at, level) => format!("octree node {} of side {}", numbers(at), 1u64 << level),
-        Place::Octant(at, level) => format!("octant {} of side {}", numbers(at), 1u64 << level),
-        Place::Node(i) => format!("node {i}"),
-        Place::Leaf(i) => format!("leaf {i}"),
-        Place::Block(i) => format!("block {i}"),
-        Place::Run(i) => format!("run {i}"),
-        Place::Places(i) => format!("node {i} over places"),
-        Place::PlacedNode(first, i) => format!("node {i} of the object from prim {first} on"),
-        Place::PlacedBlock(first, i) => format!("block {i} of the object from prim {first} on"),
-        Place::Object(i) => match visit.extent {
+        NodeId::Cell(cell) => format!("cell {}", numbers(cell)),
+        NodeId::OctreeNode(at, level) => format!("octree node {} of side {}", numbers(at), 1u64 << level),
+        NodeId::Octant(at, level) => format!("octant {} of side {}", numbers(at), 1u64 << level),
+        NodeId::Node(i) => format!("node {i}"),
+        NodeId::Leaf(i) => format!("leaf {i}"),
+        NodeId::Block(i) => format!("block {i}"),
+        NodeId::Run(i) => format!("run {i}"),
+        NodeId::Places(i) => format!("node {i} over places"),
+        NodeId::PlacedNode(first, i) => format!("node {i} of the object from prim {first} on"),
+        NodeId::PlacedBlock(first, i) => format!("block {i} of the object from prim {first} on"),
+        NodeId::Object(i) => match visit.extent {
             Extent::Ball { .. } => format!("sphere around object {i}"),
             Extent::Box(_) => format!("box around object {i}"),
         },

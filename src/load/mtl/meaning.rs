@@ -289,7 +289,7 @@ impl Meaning<'_> {
         }
     }
 
-    /// `Ka` is what most programs write without looking: 0, 1, or a copy of `Kd`.
+    /// `Ka` is what most programs write without queries: 0, 1, or a copy of `Kd`.
     fn ambient(&mut self, kd: Vec3) -> Vec3 {
         let ka = self.mtl.ka.map(color);
         if !self.guessing() {

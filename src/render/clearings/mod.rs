@@ -1,4 +1,4 @@
-//! Gaps of what is cut out or blended, known without shading: rays pass them on their way. And where it is solid: it stops rays
+//! IntersectFilter of what is cut out or blended, known without shading: rays pass them on their way. And where it is solid: it stops rays
 //! to lights.
 //!
 //! Most of what rays meet in a tree are the clear parts of its leaves. Where a map is clear as far around as a lookup may read
@@ -14,7 +14,7 @@ use super::shade::is_cut_out;
 use super::texture::{Codes, Survey, TextureStore};
 use super::wave::{Path, Wave};
 use super::world::{PrimSource, World, code, least_solid};
-use crate::accel::{Gaps, Hit, Ray};
+use crate::accel::{Hit, IntersectFilter, Ray};
 use crate::math::simd::{LANES, Level};
 use crate::math::{Vec2, Vec4};
 use crate::scene::{AlphaMode, Instance, Material, Mesh, Scene, TextureRef};
@@ -164,7 +164,7 @@ impl<'a> Clearings<'a> {
     }
 
     /// Whether a ray that looks meets prim `prim`, if it does, where nothing is for certain.
-    fn is_gap(&self, sight: &Sight, prim: u32) -> bool {
+    fn rejects(&self, sight: &Sight, prim: u32) -> bool {
         let known = self.face(prim, 1).filter(|(_, map)| map.has_gaps());
         known.is_some_and(|(face, map)| face.sure(map, &Rays::new([*sight], true)).clear == 1)
     }
@@ -188,7 +188,7 @@ impl<'a> Clearings<'a> {
                 Some(faces) => *faces.get(before + (prim - run.start) as usize)?,
                 None => self.make(maps, prim)?,
             },
-            None if self.world.kept.is_empty() => return None,
+            None if self.world.instanced.is_empty() => return None,
             None => self.make(maps, prim)?,
         };
         let survey = (**maps.surveys.get((face.map as usize).checked_sub(1)?)?).as_ref()?;
@@ -338,12 +338,12 @@ impl Before<'_, '_> {
     }
 }
 
-impl Gaps for Before<'_, '_> {
-    fn is_gap(&self, ray: usize, prim: u32) -> bool {
-        self.clearings.is_gap(&self.sight(ray), prim)
+impl IntersectFilter for Before<'_, '_> {
+    fn rejects(&self, ray: usize, prim: u32) -> bool {
+        self.clearings.rejects(&self.sight(ray), prim)
     }
 
-    fn gaps(&self, first: usize, rays: u32, prim: u32) -> u32 {
+    fn rejects_of(&self, first: usize, rays: u32, prim: u32) -> u32 {
         let (mut left, mut passing) = (rays, 0);
         let known = self.clearings.face(prim, rays.count_ones() as usize);
         let Some((face, map)) = known.filter(|(_, map)| map.has_gaps()) else { return 0 };

@@ -158,7 +158,7 @@ fn what_is_said_to_be_a_gap_is_shaded_as_nothing_and_what_is_said_to_stop_light_
             let what = || format!("round {round}: {:?}, {ray:?} {cone:?} {hit:?}", scene.materials[prim as usize]);
             let target = Target::new(&scene, &world, prim);
             all += 1;
-            if clearings.is_gap(&sight, prim) {
+            if clearings.rejects(&sight, prim) {
                 let surface = Surface::new(&world, target, &ray, &hit, cone[0] + cone[1] * hit.t);
                 assert!(surface.front || target.material.double_sided, "its back is crossed: {}", what());
                 assert!(hit.t > from, "it may be met once more: {}", what());
@@ -193,9 +193,9 @@ fn rays_that_are_asked_together_are_told_what_each_is_told_alone() {
         let [widths, spreads] = [0, 1].map(|k| cones.iter().map(|cone| cone[k]).collect::<Vec<f32>>());
         let before = clearings.before(&rays, Cones::Eyes([&widths, &spreads]));
         let mask = (0..32).filter(|_| random.below(3) != 0).fold(0, |mask, ray| mask | 1 << ray);
-        let alone = (0..32).filter(|&ray| mask >> ray & 1 == 1 && before.is_gap(8 + ray, prim));
+        let alone = (0..32).filter(|&ray| mask >> ray & 1 == 1 && before.rejects(8 + ray, prim));
         let alone = alone.fold(0, |mask, ray| mask | 1 << ray);
-        assert_eq!(before.gaps(8, mask, prim), alone, "{:?}", scene.materials[prim as usize]);
+        assert_eq!(before.rejects_of(8, mask, prim), alone, "{:?}", scene.materials[prim as usize]);
         passed += alone.count_ones();
     }
     assert!(passed > 1000, "{passed}");

@@ -310,9 +310,9 @@ impl Given {
     /// Position and error.
     #[inline(always)]
     fn place(&self, found: &mut Found, i: usize) {
-        let facet = self.faces.facet(i);
+        let plane = self.faces.plane(i);
         let weights = (self.weights[0][i], self.weights[1][i]);
-        let (position, error, certain) = facet.place(get(&self.origin, i), get(&self.dir, i), weights);
+        let (position, error, certain) = plane.place(get(&self.origin, i), get(&self.dir, i), weights);
         put(&mut found.position, i, position);
         put(&mut found.error, i, error);
         found.certain[i] = u32::from(certain);

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::columns::{LANES, POINTS};
-use crate::accel::refine::Facet;
+use crate::accel::refine::TrianglePlane;
 use crate::math::inset::Rim;
 use crate::math::triangle::Flat;
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
@@ -73,8 +73,8 @@ impl Skin {
 
 impl FaceNumbers {
     /// Of prim `prim`, with the unit normal on its front and the normals of its corners, if it has any.
-    pub(super) fn new(prim: u32, facet: &Facet, outward: Vec3, normals: Option<[Vec3; 3]>) -> Self {
-        let Facet { flat: Flat { corner: c, normal: n, sizes: s }, rim: Rim { heights2: [e, f, g] } } = *facet;
+    pub(super) fn new(prim: u32, plane: &TrianglePlane, outward: Vec3, normals: Option<[Vec3; 3]>) -> Self {
+        let TrianglePlane { flat: Flat { corner: c, normal: n, sizes: s }, rim: Rim { heights2: [e, f, g] } } = *plane;
         let [p, q, r] = normals.unwrap_or_default();
         Self {
             wide: [c.x, c.y, c.z, n.x, n.y, n.z, s.x, s.y, s.z, e, f, g],
@@ -158,11 +158,11 @@ impl Faces {
 
     /// The plane and the rim.
     #[inline(always)]
-    pub(super) fn facet(&self, i: usize) -> Facet {
+    pub(super) fn plane(&self, i: usize) -> TrianglePlane {
         let w = |k: usize| self.wide[k][i];
         let three = |k: usize| DVec3::new(w(k), w(k + 1), w(k + 2));
         let rim = Rim { heights2: [w(9), w(10), w(11)] };
-        Facet { flat: Flat { corner: three(0), normal: three(3), sizes: three(6) }, rim }
+        TrianglePlane { flat: Flat { corner: three(0), normal: three(3), sizes: three(6) }, rim }
     }
 
     /// The unit normal of the front.

@@ -3,7 +3,7 @@
 use super::faces::{FaceNumbers, Skin};
 use super::sheet::Sheet;
 use crate::accel::NO_PRIM;
-use crate::accel::refine::Facet;
+use crate::accel::refine::TrianglePlane;
 use crate::math::{Vec3, Vec4};
 use crate::render::context::Context;
 use crate::render::patch::Gradients;
@@ -107,7 +107,7 @@ impl Face {
     /// Looks up a prim.
     #[inline(never)]
     fn of(context: &Context, prim: u32, skins: &mut Vec<Skin>) -> Self {
-        let nothing = || FaceNumbers::new(prim, &Facet::default(), Vec3::ZERO, None);
+        let nothing = || FaceNumbers::new(prim, &TrianglePlane::default(), Vec3::ZERO, None);
         Self::new(context, prim, skins).unwrap_or_else(|| Self { numbers: nothing(), instance: NONE, skin: NONE })
     }
 
@@ -118,8 +118,8 @@ impl Face {
         let mesh = &scene.meshes[scene.instances[instance as usize].mesh as usize];
         let common = context.common[mesh.material as usize].as_ref()?;
         let corners = world.triangle(prim);
-        let facet = Facet::of(&corners);
-        let winding = facet.flat.unit();
+        let plane = TrianglePlane::of(&corners);
+        let winding = plane.flat.unit();
         if !winding.is_normalized() {
             return None;
         }
@@ -131,7 +131,7 @@ impl Face {
             let normal = |i: u32| mesh.normals.get(i as usize).copied();
             Some([normal(a)?, normal(b)?, normal(c)?])
         };
-        let numbers = FaceNumbers::new(prim, &facet, outward, normals);
+        let numbers = FaceNumbers::new(prim, &plane, outward, normals);
         let sheet = common.sheet.as_ref().filter(|sheet| sheet.covers(mesh));
         if sheet.is_none() && !common.shiny {
             return Some(Self { numbers, instance, skin: NONE });
@@ -148,8 +148,8 @@ impl Face {
         corners: &crate::math::triangle::Triangle,
         normals: Option<[Vec3; 3]>,
     ) -> Self {
-        let facet = Facet::of(corners);
-        Self { numbers: FaceNumbers::new(prim, &facet, facet.flat.unit(), normals), instance: NONE, skin: NONE }
+        let plane = TrianglePlane::of(corners);
+        Self { numbers: FaceNumbers::new(prim, &plane, plane.flat.unit(), normals), instance: NONE, skin: NONE }
     }
 }
 

@@ -127,7 +127,7 @@ fn what_is_kept_once_for_many_places_has_the_same_gaps_in_all_of_them() {
         }
         let pictures = [Instancing::Flatten, Instancing::Keep].map(|how| {
             let world = World::placing(&s.scene, how);
-            assert_eq!(world.kept.is_empty(), how == Instancing::Flatten);
+            assert_eq!(world.instanced.is_empty(), how == Instancing::Flatten);
             let (accel, _) = world.structure(AccelChoice::Kind(AccelKind::FastBvh), &AccelParams::DEFAULT);
             let (textures, Stage { scene, view, settings }) = (TextureStore::new(&s.scene), &s);
             let job = Job { scene, world: &world, accel: &accel, textures: &textures, view, settings };

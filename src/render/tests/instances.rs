@@ -69,7 +69,7 @@ fn rendered(stage: &Stage, how: Instancing, kind: AccelKind) -> (Rendered, usize
     let job = Job { scene, world: &world, accel: &accel, textures: &textures, view, settings };
     let rendered = render_counted(&job, &());
     assert!(crate::render::render(&job, &()).picture == rendered.picture, "counted and not counted");
-    (rendered, world.kept.placed().len())
+    (rendered, world.instanced.placed().len())
 }
 
 #[test]
@@ -163,9 +163,9 @@ fn prims_of_kept_instances_lead_back_to_where_they_came_from() {
 #[test]
 fn instances_are_kept_without_being_asked_for_where_that_saves_much() {
     let kept = |triangles| World::placing(&Family::Instances.scene(triangles), Instancing::Auto);
-    assert!(kept(100_000).kept.is_empty());
+    assert!(kept(100_000).instanced.is_empty());
     let world = kept(400_000);
-    let (places, stored) = (world.kept.placed().len(), world.kept.stored());
+    let (places, stored) = (world.instanced.placed().len(), world.instanced.stored());
     assert!(places > 150 && places * stored == world.triangles() as usize, "{places} times {stored}");
     assert!(world.shapes.triangles.is_empty());
 }
@@ -175,7 +175,7 @@ fn memory_of_a_hundred_times_the_instances_is_hardly_more() {
     let bytes = |triangles| {
         let world = World::placing(&Family::Instances.scene(triangles), Instancing::Keep);
         let (accel, _) = world.structure(AccelChoice::Kind(AccelKind::FastOctree), &AccelParams::DEFAULT);
-        (world.kept.placed().len(), world.bytes() as u64 + accel.summary().bytes)
+        (world.instanced.placed().len(), world.bytes() as u64 + accel.summary().bytes)
     };
     let ((few, small), (many, large)) = (bytes(24_000), bytes(2_400_000));
     assert!(many > 90 * few, "{few} and {many} instances");

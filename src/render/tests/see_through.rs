@@ -357,7 +357,7 @@ fn light_through_holes_is_what_is_left_when_every_surface_is_asked() {
             let asked = with_everything(&s);
             for instances in [Instancing::Flatten, Instancing::Keep] {
                 let world = World::placing(&s.scene, instances);
-                assert!(world.kept.is_empty() == (instances == Instancing::Flatten));
+                assert!(world.instanced.is_empty() == (instances == Instancing::Flatten));
                 let rendered = render_in(&s, &world);
                 assert!(rendered.picture == asked.picture, "{alpha_mode:?}, {magnify:?}, {instances:?}");
                 // One question answers a ray.

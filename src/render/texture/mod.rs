@@ -1,4 +1,4 @@
-//! Looking up textures: wrap, filter, and the right sharpness for the size of a pixel.
+//! HitQueries up textures: wrap, filter, and the right sharpness for the size of a pixel.
 //!
 //! Bitmaps stay as they were stored; texels are decoded when read (`decode`), and smaller copies exist only once a lookup
 //! needs them (`pyramid`). A footprint longer than wide is covered by several probes along its longer axis, the way of

@@ -1,7 +1,7 @@
-//! The scene as the structures see it: every instance's shapes in one centred `f32` frame, but for what is kept as objects
+//! The scene as the structures see it: every instance's shapes in one centred `f32` frame, but for objects that are stored once
 //! that stand in several places; and the way back from a prim to what it came from.
 //!
-//! Prims have the numbers of the flattened scene, whether or not anything is kept.
+//! Prims have the numbers of the flattened scene, whether or not anything is instanced.
 
 mod placing;
 mod rounding;
@@ -11,12 +11,12 @@ pub use rounding::Moved;
 
 pub use placing::Placing;
 
-use super::keeping::{self, Instancing};
+use super::instancing::{self, Instancing};
 use crate::accel::auto::{self, Reason};
-use crate::accel::instances::Spot;
+use crate::accel::instances::PrimLocation;
 use crate::accel::refine::Refined;
 use crate::accel::shapes::Prim;
-use crate::accel::{AccelChoice, AccelParams, AnyAccel, BitSet, Hit, Kept, Ray, Shapes};
+use crate::accel::{AccelChoice, AccelParams, AnyAccel, BitSet, Hit, InstancedObjects, Ray, Shapes};
 use crate::math::triangle::Triangle;
 use crate::math::{DMat3, DVec3, Vec3};
 use crate::scene::mesh::normal_from_object;
@@ -32,11 +32,11 @@ pub struct World {
     pub center: DVec3,
     /// Box of everything but planes, world space; `lo > hi` when there is nothing.
     pub bounds: (DVec3, DVec3),
-    /// Every shape that is not kept, centred; all of them where nothing is kept, as [`World::new`] does. A structure over
+    /// Every shape that is not instanced, centred; all of them where nothing is, as [`World::new`] does. A structure over
     /// everything is [`Self::structure`].
     pub shapes: Shapes,
     /// What is stored once and stands in several places.
-    pub kept: Kept,
+    pub instanced: InstancedObjects,
     /// First prim of each instance's triangles, and one past the last.
     first_triangle: Vec<u32>,
     /// First polygon (counted from 0) of each instance, and one past the last.
@@ -110,7 +110,7 @@ impl World {
         Placing::new(scene, how).world()
     }
 
-    /// A structure over everything, and the reason where there was a choice. Where anything is kept, kinds that cannot hold it
+    /// A structure over everything, and the reason where there was a choice. Where anything is instanced, kinds that cannot hold it
     /// give way to `fast-octree`, as [`AnyAccel::kind`] tells: to compare structures, keep nothing ([`World::new`]).
     ///
     /// # Panics
@@ -132,17 +132,17 @@ impl World {
         choice: AccelChoice,
         params: &AccelParams,
     ) -> (AnyAccel<'_>, Option<Reason>) {
-        auto::build_with(eye_rays, choice, (&self.shapes, &self.kept), params)
+        auto::build_with(eye_rays, choice, (&self.shapes, &self.instanced), params)
     }
 
     /// Which structure [`AccelChoice::Auto`] is, and why.
     pub fn judged(&self) -> Reason {
-        auto::reason(&self.shapes, &self.kept, u64::MAX)
+        auto::reason(&self.shapes, &self.instanced, u64::MAX)
     }
 
     /// Number of prims of all kinds, those of an object once for each place where it stands.
     pub fn len(&self) -> usize {
-        self.shapes.len() + self.kept.shown() as usize
+        self.shapes.len() + self.instanced.shown() as usize
     }
 
     /// Whether there is nothing to hit.
@@ -152,18 +152,18 @@ impl World {
 
     /// Number of triangles, likewise: the lowest prims.
     pub fn triangles(&self) -> u32 {
-        index(self.shapes.triangles.len()) + self.kept.shown()
+        index(self.shapes.triangles.len()) + self.instanced.shown()
     }
 
     /// Bytes of the shapes as they are stored.
     pub fn bytes(&self) -> usize {
-        keeping::bytes(&self.shapes, &self.kept)
+        instancing::bytes(&self.shapes, &self.instanced)
     }
 
     /// What prim `prim` is, in the centred frame.
     #[inline]
     pub fn prim(&self, prim: u32) -> Prim<'_> {
-        self.kept.prim(&self.shapes, prim)
+        self.instanced.prim(&self.shapes, prim)
     }
 
     /// Whether a ray that starts on prim `prim` cannot meet it again.
@@ -173,15 +173,15 @@ impl World {
 
     /// Number of objects with bounded prims: those of faces, each where it stands, then each sphere and cone.
     pub fn objects(&self) -> usize {
-        self.shapes.objects().len() + self.kept.placed().len()
+        self.shapes.objects().len() + self.instanced.placed().len()
     }
 
     /// The corners of triangle `prim`, in the centred frame.
     #[inline]
     pub fn triangle(&self, prim: u32) -> Triangle {
-        match self.kept.find(prim) {
-            Spot::Stored(prim) => self.shapes.triangle(prim),
-            Spot::Placed(placed, triangle) => self.kept.triangle(placed, triangle),
+        match self.instanced.find(prim) {
+            PrimLocation::Stored(prim) => self.shapes.triangle(prim),
+            PrimLocation::Placed(placed, triangle) => self.instanced.triangle(placed, triangle),
         }
     }
 
@@ -213,7 +213,7 @@ impl World {
     #[must_use]
     pub fn with_everything(mut self) -> Self {
         self.shapes.opaque = BitSet::filled(self.shapes.len(), false);
-        self.kept.open_all();
+        self.instanced.open_all();
         self
     }
 
@@ -224,7 +224,7 @@ impl World {
 
     /// Whether prim `prim` is stored by itself, and not once for all places where it stands.
     pub(crate) fn is_stored(&self, prim: u32) -> bool {
-        matches!(self.kept.find(prim), Spot::Stored(_))
+        matches!(self.instanced.find(prim), PrimLocation::Stored(_))
     }
 
     /// What prim `prim` came from; of a number below [`Self::len`], others mean nothing.
@@ -270,7 +270,7 @@ impl World {
         &self.placements[instance as usize]
     }
 
-    /// Of what is not kept.
+    /// Of what is not instanced.
     fn opaque_bits(&self, scene: &Scene, solids: &[Solid]) -> BitSet {
         let mut bits = BitSet::filled(self.shapes.len(), true);
         if scene.materials.iter().all(Material::is_opaque) {
@@ -286,7 +286,7 @@ impl World {
             };
             let polygons = self.first_polygon[i] + first_polygon..self.first_polygon[i + 1] + first_polygon;
             polygons.for_each(|prim| bits.set(prim, false));
-            if let Spot::Stored(first) = self.kept.find(self.first_triangle[i]) {
+            if let PrimLocation::Stored(first) = self.instanced.find(self.first_triangle[i]) {
                 let triangles = 0..self.first_triangle[i + 1] - self.first_triangle[i];
                 let open = triangles.filter(|&triangle| !solid.is_some_and(|solid| solid.get(triangle)));
                 open.for_each(|triangle| bits.set(first + triangle, false));
@@ -294,7 +294,7 @@ impl World {
         }
         let others = first_polygon + index(self.shapes.polygons.len());
         for prim in others..index(self.shapes.len()) {
-            let material = self.material(scene, self.kept.number(prim));
+            let material = self.material(scene, self.instanced.number(prim));
             bits.set(prim, scene.materials[material as usize].is_opaque());
         }
         bits

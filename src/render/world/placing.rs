@@ -1,4 +1,4 @@
-//! What is kept and where it stands, and then the whole world.
+//! Which objects are instanced and where they stand, and then the whole world.
 
 use super::solid::{Solid, solids};
 use super::{Placement, World, index};
@@ -6,7 +6,7 @@ use crate::accel::instances::placed;
 use crate::accel::{Cone, Shapes, SpherePrim};
 use crate::math::frame::{center_of_most, spread};
 use crate::math::{DAffine3, DVec3, Vec3};
-use crate::render::keeping::{Instancing, Keeping};
+use crate::render::instancing::{InstancePlan, Instancing};
 use crate::scene::corners::{Hull, take_in};
 use crate::scene::{Instance, Mesh, Scene};
 use rayon::prelude::*;
@@ -15,35 +15,35 @@ use rayon::prelude::*;
 /// built; measured on four million.
 const PLACED: u64 = 120;
 
-/// A scene of which is known what is kept and where it stands, before anything is stored.
+/// A scene of which is known which objects are instanced and where they stand, before anything is stored.
 pub struct Placing<'a> {
     scene: &'a Scene,
     bounds: (DVec3, DVec3),
     center: DVec3,
     /// What of each mesh stops light.
     solids: Vec<Solid>,
-    keeping: Keeping,
+    instancing: InstancePlan,
 }
 
 impl<'a> Placing<'a> {
-    /// Finds the centre, chooses what is kept, and where it stands.
+    /// Finds the centre, chooses which objects are instanced, and where they stand.
     pub fn new(scene: &'a Scene, how: Instancing) -> Self {
         let bounds = bounds(scene);
         let center = center_of_most(bounds.0, bounds.1, sample(scene).into_iter());
         let solids = solids(scene);
-        let keeping = Keeping::of(scene, how, |mesh| solids[mesh] == Solid::All, |m| centered(m, center));
-        Self { scene, bounds, center, solids, keeping }
+        let instancing = InstancePlan::of(scene, how, |mesh| solids[mesh] == Solid::All, |m| centered(m, center));
+        Self { scene, bounds, center, solids, instancing }
     }
 
     /// Bytes that its world and a structure over it take at least for triangles of instances that are stored by themselves.
     pub fn bytes(&self) -> u64 {
-        let each = self.scene.instances.iter().zip(&self.keeping.places).filter(|(_, place)| place.is_none());
+        let each = self.scene.instances.iter().zip(&self.instancing.places).filter(|(_, place)| place.is_none());
         placed_bytes(self.scene, each.map(|(instance, _)| instance))
     }
 
     /// Stores everything where it stands, rounded once.
     pub fn world(self) -> World {
-        let Self { scene, bounds, center, solids, keeping: Keeping { mut kept, places } } = self;
+        let Self { scene, bounds, center, solids, instancing: InstancePlan { mut instanced, places } } = self;
         let mut shapes = Shapes::default();
         let alone = || scene.instances.iter().zip(&places).filter(|(_, place)| place.is_none());
         let all = |size: fn(&Mesh) -> usize| alone().map(|(i, _)| size(&scene.meshes[i.mesh as usize])).sum();
@@ -56,10 +56,10 @@ impl<'a> Placing<'a> {
         // Triangles and polygons, instance by instance, so that prim ids follow the file's order.
         for (instance, place) in scene.instances.iter().zip(places) {
             let mesh = &scene.meshes[instance.mesh as usize];
-            first_triangle.push(index(shapes.triangles.len()) + kept.shown());
+            first_triangle.push(index(shapes.triangles.len()) + instanced.shown());
             first_polygon.push(index(shapes.polygons.len()));
             if let Some((object, place)) = place {
-                kept.put(object, index(shapes.triangles.len()) + kept.shown(), place);
+                instanced.put(object, index(shapes.triangles.len()) + instanced.shown(), place);
                 continue;
             }
             let base = index(shapes.vertices.len());
@@ -73,7 +73,7 @@ impl<'a> Placing<'a> {
             shapes.polygons.extend(mesh.polygons.iter().map(|p| (p.first + corners, p.len)));
             shapes.polygon_corners.extend(mesh.polygon_corners.iter().map(|i| i + base));
         }
-        first_triangle.push(index(shapes.triangles.len()) + kept.shown());
+        first_triangle.push(index(shapes.triangles.len()) + instanced.shown());
         first_polygon.push(index(shapes.polygons.len()));
 
         put_solids(scene, center, &mut shapes);
@@ -86,7 +86,7 @@ impl<'a> Placing<'a> {
         let others = spheres.chain(cones).chain(scene.planes.iter().map(|plane| plane.material));
         let mut meshes = scene.instances.iter().map(|instance| &solids[instance.mesh as usize]);
         let opaque = meshes.all(|solid| *solid == Solid::All) && !others.into_iter().any(is_open);
-        let mut world = World { center, bounds, shapes, kept, first_triangle, first_polygon, placements, opaque };
+        let mut world = World { center, bounds, shapes, instanced, first_triangle, first_polygon, placements, opaque };
         world.shapes.opaque = world.opaque_bits(scene, &solids);
         world
     }

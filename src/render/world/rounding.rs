@@ -2,7 +2,7 @@
 
 use super::World;
 use super::placing::{PARALLEL_RUN, centered};
-use crate::accel::instances::Spot;
+use crate::accel::instances::PrimLocation;
 use crate::math::aabb::Aabb;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Scene;
@@ -35,9 +35,9 @@ impl World {
             pairs.map(off).filter(|off| off.is_finite()).reduce(|| 0.0, f64::max)
         });
         let stored = stored.fold(0.0, f64::max);
-        let kept = self.kept.placed().iter().map(|placed| half_steps(&placed.place.bounds));
+        let instanced = self.instanced.placed().iter().map(|placed| half_steps(&placed.place.bounds));
         let solids = self.solids_moved(scene).map(|(_, off, _)| off);
-        kept.chain(solids).fold(stored, f64::max)
+        instanced.chain(solids).fold(stored, f64::max)
     }
 
     /// How far rounding has moved each sphere and cone, and how large it is.
@@ -74,7 +74,7 @@ impl World {
         if scene.instances.len() < 2 {
             return None;
         }
-        // What is kept has been looked at.
+        // Instanced objects have been looked at.
         for (i, instance) in scene.instances.iter().enumerate().filter(|(i, _)| self.stored(*i)) {
             let len = scene.meshes[instance.mesh as usize].positions.len();
             let there = Aabb::around(self.shapes.vertices[from..from + len].iter().copied());
@@ -93,7 +93,7 @@ impl World {
     /// Whether an instance is stored by itself.
     fn stored(&self, instance: usize) -> bool {
         let (first, end) = (self.first_triangle[instance], self.first_triangle[instance + 1]);
-        first == end || matches!(self.kept.find(first), Spot::Stored(_))
+        first == end || matches!(self.instanced.find(first), PrimLocation::Stored(_))
     }
 }
 

@@ -1,6 +1,6 @@
 //! From a binary tree to nodes of eight.
 //!
-//! Which knots become nodes is chosen so that they cost the least: for every knot it is known what it costs to stand for
+//! Which build nodes become nodes is chosen so that they cost the least: for every build node it is known what it costs to stand for
 //! everything below it by one child of a node, by two, and so on; a node takes what eight cost least. After H. Ylitie,
 //! T. Karras, S. Laine, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*, 2017. What a node costs is
 //! the chance that a ray enters it: of one that comes from afar the area of its box, of one that starts or ends at a shape
@@ -11,7 +11,7 @@ use std::ops::Range;
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
-use super::knots::Knot;
+use super::build_nodes::BuildNode;
 use super::slots::slots;
 use crate::accel::wide::node::{Arrays, Child, Node, index};
 use crate::math::aabb::Aabb;
@@ -20,28 +20,28 @@ use crate::math::simd::LANES;
 /// Knots that are worth a thread's while.
 const PARALLEL: usize = 512;
 
-/// A subtree of at most this part of all knots is a piece. The same for every number of threads: so is the order of nodes.
+/// A subtree of at most this part of all build nodes is a piece. The same for every number of threads: so is the order of nodes.
 const PIECES: usize = 64;
 
 /// How many rays start or end at a shape where one comes from afar.
 const NEAR: f32 = 0.15;
 
-/// The best ways of standing for a knot and all below it.
+/// The best ways of standing for a build node and all below it.
 #[derive(Clone, Copy, Zeroable)]
 struct Plan {
     /// By one child at most, two, … seven: what all nodes below cost, as areas.
     costs: [f32; LANES - 1],
-    /// Knots below a knot, and itself; 0 of a leaf.
-    knots: u32,
+    /// Knots below a build node, and itself; 0 of a leaf.
+    build_nodes: u32,
     /// How many of two children, three, … eight, of a node of its own, stand for the first side; 0: one fewer will do.
     shares: [u8; LANES - 1],
 }
 
 impl Plan {
-    const LEAF: Self = Self { costs: [0.0; LANES - 1], knots: 0, shares: [0; LANES - 1] };
+    const LEAF: Self = Self { costs: [0.0; LANES - 1], build_nodes: 0, shares: [0; LANES - 1] };
 
-    /// Of a knot over two sides; `near` is what a knot below a node adds to what that costs.
-    fn of(knot: &Knot, near: f32, [first, second]: [&Self; 2]) -> Self {
+    /// Of a build node over two sides; `near` is what a build node below a node adds to what that costs.
+    fn of(build_node: &BuildNode, near: f32, [first, second]: [&Self; 2]) -> Self {
         let cheapest = |children: usize| {
             let cost = |share: usize| first.costs[share - 1] + second.costs[children - share - 1];
             (2..children)
@@ -49,8 +49,8 @@ impl Plan {
         };
         let mut plan = Self::LEAF;
         let (below, share) = cheapest(LANES);
-        plan.knots = 1 + first.knots.max(1) + second.knots.max(1);
-        plan.costs[0] = knot.area() + plan.knots as f32 * near + below;
+        plan.build_nodes = 1 + first.build_nodes.max(1) + second.build_nodes.max(1);
+        plan.costs[0] = build_node.area() + plan.build_nodes as f32 * near + below;
         plan.shares[LANES - 2] = share as u8;
         for children in 2..LANES {
             let (cost, share) = cheapest(children);
@@ -64,24 +64,24 @@ impl Plan {
     }
 }
 
-/// Plans for a knot, the first, and all below it.
-fn plan(knots: &[Knot], near: f32, plans: &mut [Plan]) {
-    let Some(root) = knots.first().filter(|_| knots.len() > PARALLEL) else {
-        for (at, knot) in knots.iter().enumerate().rev() {
+/// Plans for a build node, the first, and all below it.
+fn plan(build_nodes: &[BuildNode], near: f32, plans: &mut [Plan]) {
+    let Some(root) = build_nodes.first().filter(|_| build_nodes.len() > PARALLEL) else {
+        for (at, build_node) in build_nodes.iter().enumerate().rev() {
             // Leaves are written, too: a page that is read first takes two faults, the second of which stops all threads.
-            let is_leaf = knot.is_leaf();
+            let is_leaf = build_node.is_leaf();
             plans[at] = if is_leaf {
                 Plan::LEAF
             } else {
-                Plan::of(knot, near, [&plans[at + 1], &plans[at + knot.at as usize]])
+                Plan::of(build_node, near, [&plans[at + 1], &plans[at + build_node.at as usize]])
             };
         }
         return;
     };
     let second = root.at as usize;
     let (first_plans, second_plans) = plans.split_at_mut(second);
-    let (first, below) = (&knots[1..second], &mut first_plans[1..]);
-    rayon::join(|| plan(first, near, below), || plan(&knots[second..], near, second_plans));
+    let (first, below) = (&build_nodes[1..second], &mut first_plans[1..]);
+    rayon::join(|| plan(first, near, below), || plan(&build_nodes[second..], near, second_plans));
     plans[0] = Plan::of(root, near, [&plans[1], &plans[second]]);
 }
 
@@ -97,18 +97,18 @@ pub(super) struct Nodes {
 
 impl Nodes {
     /// The nodes over a binary tree whose leaves are packed children.
-    pub(super) fn over(knots: &[Knot]) -> Self {
-        let mut plans = bytemuck::zeroed_vec(knots.len());
-        let near = knots.first().map_or(0.0, Knot::area) * NEAR / knots.len() as f32;
-        plan(knots, near, &mut plans);
-        let collapse = Collapse { knots, plans: &plans };
+    pub(super) fn over(build_nodes: &[BuildNode]) -> Self {
+        let mut plans = bytemuck::zeroed_vec(build_nodes.len());
+        let near = build_nodes.first().map_or(0.0, BuildNode::area) * NEAR / build_nodes.len() as f32;
+        plan(build_nodes, near, &mut plans);
+        let collapse = Collapse { build_nodes, plans: &plans };
 
         let (mut top, mut subtrees) = (Vec::new(), Vec::new());
-        let largest = PARALLEL.max(knots.len() / PIECES);
-        collapse.top(0..knots.len(), 0, largest, &mut top, &mut subtrees);
+        let largest = PARALLEL.max(build_nodes.len() / PIECES);
+        collapse.top(0..build_nodes.len(), 0, largest, &mut top, &mut subtrees);
         let built = subtrees.par_iter().map(|subtree: &Subtree| {
             let mut nodes = Vec::new();
-            let depth = collapse.node(subtree.knots.clone(), &mut nodes);
+            let depth = collapse.node(subtree.build_nodes.clone(), &mut nodes);
             (nodes, subtree.above + depth)
         });
         let built: Vec<(Vec<Node>, u32)> = built.collect();
@@ -131,7 +131,7 @@ impl Nodes {
 
 /// A part of a tree that is built as a piece of its own.
 struct Subtree {
-    knots: Range<usize>,
+    build_nodes: Range<usize>,
     /// The node among those at the top, and its slot, which lead there.
     parent: usize,
     slot: usize,
@@ -140,7 +140,7 @@ struct Subtree {
 }
 
 struct Collapse<'k> {
-    knots: &'k [Knot],
+    build_nodes: &'k [BuildNode],
     plans: &'k [Plan],
 }
 
@@ -158,29 +158,36 @@ impl Children {
 }
 
 impl Collapse<'_> {
-    /// Adds the node of a knot, the first of these, below so many nodes, and those below it that stand for more than `largest`
-    /// knots; lists the others.
-    fn top(&self, knots: Range<usize>, above: u32, largest: usize, nodes: &mut Vec<Node>, subtrees: &mut Vec<Subtree>) {
-        let (children, slots, parent) = self.open(knots, nodes);
+    /// Adds the node of a build node, the first of these, below so many nodes, and those below it that stand for more than `largest`
+    /// build nodes; lists the others.
+    fn top(
+        &self,
+        build_nodes: Range<usize>,
+        above: u32,
+        largest: usize,
+        nodes: &mut Vec<Node>,
+        subtrees: &mut Vec<Subtree>,
+    ) {
+        let (children, slots, parent) = self.open(build_nodes, nodes);
         for (below, slot) in children.iter().zip(slots) {
-            if self.knots[below.start].is_leaf() {
+            if self.build_nodes[below.start].is_leaf() {
                 continue;
             }
             if below.len() > largest {
                 nodes[parent].children[slot] = Child::Node(index(nodes.len())).pack();
                 self.top(below.clone(), above + 1, largest, nodes, subtrees);
             } else {
-                subtrees.push(Subtree { knots: below.clone(), parent, slot, above: above + 1 });
+                subtrees.push(Subtree { build_nodes: below.clone(), parent, slot, above: above + 1 });
             }
         }
     }
 
-    /// Adds the node of a knot, the first of these, and all below; how many nodes are on the longest way down.
-    fn node(&self, knots: Range<usize>, nodes: &mut Vec<Node>) -> u32 {
-        let (children, slots, at) = self.open(knots, nodes);
+    /// Adds the node of a build node, the first of these, and all below; how many nodes are on the longest way down.
+    fn node(&self, build_nodes: Range<usize>, nodes: &mut Vec<Node>) -> u32 {
+        let (children, slots, at) = self.open(build_nodes, nodes);
         let mut deepest = 0;
         for (below, slot) in children.iter().zip(slots) {
-            if !self.knots[below.start].is_leaf() {
+            if !self.build_nodes[below.start].is_leaf() {
                 nodes[at].children[slot] = Child::Node(index(nodes.len())).pack();
                 deepest = deepest.max(self.node(below.clone(), nodes));
             }
@@ -189,50 +196,50 @@ impl Collapse<'_> {
     }
 
     /// Adds a node whose children are chosen, but for those that will be nodes; these and their slots, and its own place.
-    fn open(&self, knots: Range<usize>, nodes: &mut Vec<Node>) -> (Children, [usize; LANES], usize) {
+    fn open(&self, build_nodes: Range<usize>, nodes: &mut Vec<Node>) -> (Children, [usize; LANES], usize) {
         let mut children = Children::default();
-        self.expand(knots, LANES, &mut children);
+        self.expand(build_nodes, LANES, &mut children);
         let mut bounds = [Aabb::EMPTY; LANES];
         for (bounds, child) in bounds.iter_mut().zip(children.iter()) {
-            *bounds = self.knots[child.start].bounds();
+            *bounds = self.build_nodes[child.start].bounds();
         }
         let slots = slots(&bounds[..children.len]);
         let mut node = Node::EMPTY;
         for ((child, bounds), slot) in children.iter().zip(&bounds).zip(slots) {
-            let knot = &self.knots[child.start];
-            let leaf = if knot.is_leaf() { Child::unpack(knot.at) } else { Child::unpack(Child::NOTHING) };
+            let build_node = &self.build_nodes[child.start];
+            let leaf = if build_node.is_leaf() { Child::unpack(build_node.at) } else { Child::unpack(Child::NOTHING) };
             node.set(slot, bounds, leaf);
         }
         nodes.push(node);
         (children, slots, nodes.len() - 1)
     }
 
-    /// The knots that stand for a knot, the first of these, and all below, as so many children.
-    fn expand(&self, knots: Range<usize>, mut most: usize, found: &mut Children) {
-        let (at, knot) = (knots.start, &self.knots[knots.start]);
+    /// The build nodes that stand for a build node, the first of these, and all below, as so many children.
+    fn expand(&self, build_nodes: Range<usize>, mut most: usize, found: &mut Children) {
+        let (at, build_node) = (build_nodes.start, &self.build_nodes[build_nodes.start]);
         let shares = &self.plans[at].shares;
         while (2..LANES).contains(&most) && shares[most - 2] == 0 {
             most -= 1;
         }
-        if most < 2 || knot.is_leaf() {
-            found.below[found.len] = knots;
+        if most < 2 || build_node.is_leaf() {
+            found.below[found.len] = build_nodes;
             found.len += 1;
             return;
         }
-        let (share, second) = (shares[most - 2] as usize, at + knot.at as usize);
+        let (share, second) = (shares[most - 2] as usize, at + build_node.at as usize);
         self.expand(at + 1..second, share, found);
-        self.expand(second..knots.end, most - share, found);
+        self.expand(second..build_nodes.end, most - share, found);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::knots::tests::{fork, leaf};
+    use super::super::build_nodes::tests::{fork, leaf};
     use super::*;
 
     /// The children of each node: how many there are, and how many of them are nodes.
-    fn shape(knots: &[Knot]) -> Vec<(usize, usize)> {
-        let mut packed = knots.to_vec();
+    fn shape(build_nodes: &[BuildNode]) -> Vec<(usize, usize)> {
+        let mut packed = build_nodes.to_vec();
         packed.iter_mut().filter(|k| k.is_leaf()).for_each(|k| k.at = Child::Block(k.at, 1).pack());
         let children = |node: &Node| node.children.map(Child::unpack).into_iter().filter(|c| *c != Child::Block(0, 0));
         let is_node = |c: &Child| matches!(c, Child::Node(_));
@@ -240,7 +247,7 @@ mod tests {
         nodes.iter().map(|n| (children(n).count(), children(n).filter(is_node).count())).collect()
     }
 
-    fn small(i: u32) -> Vec<Knot> {
+    fn small(i: u32) -> Vec<BuildNode> {
         leaf(i, i as f32, i as f32 + 0.5)
     }
 

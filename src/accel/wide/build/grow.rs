@@ -1,7 +1,7 @@
 //! A binary tree, from the root down.
 
+use super::build_nodes::{BuildNode, TreeBuilder, index};
 use super::cell::{Cell, Count, Lattice};
-use super::knots::{Growth, Knot, index};
 use crate::accel::wide::split::{Bounds, Cut, Item, Splitting, cut_by_area};
 use std::ops::RangeInclusive;
 
@@ -46,7 +46,7 @@ pub(super) struct Grower {
     leaf: u32,
     /// Area of the root's box.
     area: f32,
-    /// The sides of a knot over more items are grown in parallel.
+    /// The sides of a build node over more items are grown in parallel.
     parallel: usize,
 }
 
@@ -87,7 +87,7 @@ impl Grower {
 
     /// Adds the tree over some items, at least one, to `growth`; the same for every number of threads. `middles` is the box
     /// around their doubled middles, where known.
-    pub(super) fn grow(&self, work: Work, bounds: Bounds, middles: Option<Bounds>, growth: &mut Growth) {
+    pub(super) fn grow(&self, work: Work, bounds: Bounds, middles: Option<Bounds>, growth: &mut TreeBuilder) {
         let count = work.prims.len();
         if count <= self.leaf as usize {
             if let Some(cut) = self.cut_large_leaf(work.items, &bounds) {
@@ -97,7 +97,7 @@ impl Grower {
                 *place = prim;
             }
             work.prims.sort_unstable();
-            return growth.add(Knot::leaf(bounds.aabb(), work.first, index(count)));
+            return growth.add(BuildNode::leaf(bounds.aabb(), work.first, index(count)));
         }
         if work.items.len() > self.small_cell
             && let Some(cell) = self.lattice.cell(work.items, self.leaf)
@@ -121,8 +121,8 @@ impl Grower {
         Some(cut).filter(|_| worth)
     }
 
-    /// Adds the knot of a cut, and all below.
-    fn fork(&self, work: Work, cut: &Cut, bounds: Bounds, growth: &mut Growth) {
+    /// Adds the build node of a cut, and all below.
+    fn fork(&self, work: Work, cut: &Cut, bounds: Bounds, growth: &mut TreeBuilder) {
         let (count, [first, second]) = (work.items.len(), cut.bounds);
         let middles = |part: usize| cut.middles.map(|both| both[part]);
         let (first_middles, second_middles) = (middles(0), middles(1));
@@ -137,25 +137,25 @@ impl Grower {
     }
 
     /// The same for some parts of a cell.
-    fn grow_cell(&self, cell: &Cell, parts: u8, work: Work, bounds: Bounds, growth: &mut Growth) {
+    fn grow_cell(&self, cell: &Cell, parts: u8, work: Work, bounds: Bounds, growth: &mut TreeBuilder) {
         let Some(first) = cell.cut(parts) else { return self.grow(work, bounds, None, growth) };
         let second = parts & !first;
         let count = work.items.len();
         let Count { items, prims } = cell.count(first);
         let [a, b] = work.split_at(items as usize, prims as usize);
-        let grow_a = |g: &mut Growth| self.grow_cell(cell, first, a, cell.bounds(first), g);
-        let grow_b = |g: &mut Growth| self.grow_cell(cell, second, b, cell.bounds(second), g);
+        let grow_a = |g: &mut TreeBuilder| self.grow_cell(cell, first, a, cell.bounds(first), g);
+        let grow_b = |g: &mut TreeBuilder| self.grow_cell(cell, second, b, cell.bounds(second), g);
         self.join(count, bounds, growth, grow_a, grow_b);
     }
 
-    /// Adds a knot over `count` items and its two sides, which are grown in parallel where it is worth it.
+    /// Adds a build node over `count` items and its two sides, which are grown in parallel where it is worth it.
     fn join(
         &self,
         count: usize,
         bounds: Bounds,
-        growth: &mut Growth,
-        first: impl FnOnce(&mut Growth) + Send,
-        second: impl FnOnce(&mut Growth) + Send,
+        growth: &mut TreeBuilder,
+        first: impl FnOnce(&mut TreeBuilder) + Send,
+        second: impl FnOnce(&mut TreeBuilder) + Send,
     ) {
         if count > self.parallel {
             return growth.fork_shared(bounds.aabb(), first, second);
@@ -169,18 +169,18 @@ impl Grower {
 
 #[cfg(test)]
 mod tests {
-    use super::super::knots::tests::leaves;
+    use super::super::build_nodes::tests::leaves;
     use super::*;
     use crate::math::Vec3;
     use crate::math::aabb::Aabb;
 
-    fn grown(splitting: Splitting, at: &[Vec3]) -> (Vec<Knot>, Vec<u32>) {
+    fn grown(splitting: Splitting, at: &[Vec3]) -> (Vec<BuildNode>, Vec<u32>) {
         let item = |(prim, &p): (u32, &Vec3)| Item::new(Aabb { lo: p, hi: p + 0.25 }, prim);
         grown_over(splitting, (0..).zip(at).map(item).collect())
     }
 
-    fn grown_over(splitting: Splitting, mut items: Vec<Item>) -> (Vec<Knot>, Vec<u32>) {
-        let (mut spare, mut prims, mut growth) = (items.clone(), vec![0; items.len()], Growth::default());
+    fn grown_over(splitting: Splitting, mut items: Vec<Item>) -> (Vec<BuildNode>, Vec<u32>) {
+        let (mut spare, mut prims, mut growth) = (items.clone(), vec![0; items.len()], TreeBuilder::default());
         let bounds = crate::accel::wide::split::around(&items);
         let grower = Grower::new(splitting, items.len(), 1, &bounds, 8);
         let work = Work { items: &mut items, spare: &mut spare, prims: &mut prims, first: 0 };
@@ -193,10 +193,10 @@ mod tests {
         let at = |i: usize| Vec3::new((i % 37) as f32, (i % 101) as f32, (i / 50) as f32);
         let places: Vec<Vec3> = (0..3000).map(at).collect();
         for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
-            let (knots, mut prims) = grown(splitting, &places);
-            let firsts = leaves(&knots);
+            let (build_nodes, mut prims) = grown(splitting, &places);
+            let firsts = leaves(&build_nodes);
             assert!(firsts.is_sorted() && firsts[0] == 0, "{splitting:?}");
-            let counts: Vec<u32> = knots.iter().filter(|k| k.is_leaf()).map(|k| k.count).collect();
+            let counts: Vec<u32> = build_nodes.iter().filter(|k| k.is_leaf()).map(|k| k.count).collect();
             assert!(counts.iter().sum::<u32>() == 3000 && counts.iter().all(|&n| n <= 8), "{splitting:?}");
             prims.sort_unstable();
             assert!(prims.into_iter().eq(0..3000), "{splitting:?}");

@@ -1,6 +1,6 @@
 //! From shapes to a tree.
 //!
-//! A binary tree ([`knots`]) is grown from the root down ([`grow`]), improved where large and small faces are mixed
+//! A binary tree ([`build_nodes`]) is grown from the root down ([`grow`]), improved where large and small faces are mixed
 //! ([`reinsert`]) and fused into nodes of eight ([`collapse`]). Its leaves become blocks. Large parts are worked on by several
 //! threads; what they make is joined in order, so that the tree does not depend on their number.
 //!
@@ -8,19 +8,19 @@
 //! of axis k, as far as the eight slots allow. `slot ^ octant` is then about the order in which a ray meets them, where
 //! bit k of `octant` is set for a ray that runs backwards along axis k. Slots between may be empty.
 
+mod build_nodes;
 mod cell;
 mod collapse;
 mod grow;
-mod knots;
 mod reinsert;
 mod slots;
 
 use rayon::prelude::*;
 
+use self::build_nodes::{BuildNode, TreeBuilder};
 use self::collapse::Nodes;
 pub(in crate::accel) use self::grow::ALIKE;
 use self::grow::{Grower, Work};
-use self::knots::{Growth, Knot};
 use super::node::{Arrays, Block, Child, index};
 use super::split::item::around_middles;
 use super::split::{Bounds, Item, Splitting, around};
@@ -50,18 +50,18 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting, times: usize) -> Arra
         return Nodes::default().into_arrays(0, Aabb::EMPTY);
     }
     let triangles = shapes.triangles.len();
-    let Binary { knots: grown, depth: grown_depth, prims } = binary_tree(shapes, splitting, times);
-    let (mut knots, improved_depth) = reinsert::improve(grown);
+    let Binary { build_nodes: grown, depth: grown_depth, prims } = binary_tree(shapes, splitting, times);
+    let (mut build_nodes, improved_depth) = reinsert::improve(grown);
     if improved_depth.is_some_and(|depth| depth > deepest(grown_depth)) {
-        // Where boxes hardly have an area rounding makes places better, and knots may be hung one below the other.
-        knots = binary_tree(shapes, splitting, times).knots;
+        // Where boxes hardly have an area rounding makes places better, and build nodes may be hung one below the other.
+        build_nodes = binary_tree(shapes, splitting, times).build_nodes;
     }
-    let leaves = Leaves::list(&mut knots, index(triangles));
+    let leaves = Leaves::list(&mut build_nodes, index(triangles));
     let most = leaves.blocks.len().max(leaves.runs.len());
     assert!(most <= Child::MOST, "the scene is too large: {most} blocks, where a tree has room for {}", Child::MOST);
-    let bounds = knots.first().map_or(Aabb::EMPTY, Knot::bounds);
-    let nodes = Nodes::over(&knots);
-    drop(knots);
+    let bounds = build_nodes.first().map_or(Aabb::EMPTY, BuildNode::bounds);
+    let nodes = Nodes::over(&build_nodes);
+    drop(build_nodes);
     // Empty slots lead to block 0, and a ray that no box can turn away goes there too.
     let mut arrays = nodes.into_arrays(leaves.blocks.len().max(1), bounds);
     leaves.fill(arrays.blocks_mut(), shapes, &prims);
@@ -75,7 +75,7 @@ fn deepest(depth: usize) -> usize {
 
 /// A binary tree over all bounded prims.
 struct Binary {
-    knots: Vec<Knot>,
+    build_nodes: Vec<BuildNode>,
     /// Knots on the longest way down.
     depth: usize,
     /// The prims of leaves, in their order, triangles before others. A leaf holds triangles or other prims, never both.
@@ -86,7 +86,7 @@ fn binary_tree(shapes: &Shapes, splitting: Splitting, times: usize) -> Binary {
     let first_other = index(shapes.triangles.len());
     let mut prims = vec![0; shapes.bounded() as usize];
     let (triangle_prims, other_prims) = prims.split_at_mut(shapes.triangles.len());
-    let grow = |items: Items, prims: &mut [u32], first: u32, leaf: u32, growth: &mut Growth| {
+    let grow = |items: Items, prims: &mut [u32], first: u32, leaf: u32, growth: &mut TreeBuilder| {
         let Items { mut all, bounds, middles } = items;
         // Pages that nothing was written to are made by the threads that write there.
         let spare = if splitting == Splitting::Octree { all.len() } else { 0 };
@@ -97,16 +97,16 @@ fn binary_tree(shapes: &Shapes, splitting: Splitting, times: usize) -> Binary {
     let (triangles, others) = (Items::of_triangles(shapes), Items::of_others(shapes));
     let bounds = triangles.bounds.join(others.bounds).aabb();
     let lack = [&triangles, &others].map(|items| items.all.is_empty());
-    let grow_triangles = |g: &mut Growth| grow(triangles, triangle_prims, 0, LANES as u32, g);
-    let grow_others = |g: &mut Growth| grow(others, other_prims, first_other, RUN, g);
-    let mut growth = Growth::default();
+    let grow_triangles = |g: &mut TreeBuilder| grow(triangles, triangle_prims, 0, LANES as u32, g);
+    let grow_others = |g: &mut TreeBuilder| grow(others, other_prims, first_other, RUN, g);
+    let mut growth = TreeBuilder::default();
     match lack {
         [false, false] => growth.fork_shared(bounds, grow_triangles, grow_others),
         [false, true] => grow_triangles(&mut growth),
         [true, _] => grow_others(&mut growth),
     }
-    let (knots, depth) = growth.finish();
-    Binary { knots, depth, prims }
+    let (build_nodes, depth) = growth.finish();
+    Binary { build_nodes, depth, prims }
 }
 
 /// What a tree is grown over.
@@ -169,33 +169,33 @@ struct Leaves {
 }
 
 impl Leaves {
-    /// Lists the leaves among `knots`, over prims of which the first `triangles` are triangles. Each then has the child that it
+    /// Lists the leaves among `build_nodes`, over prims of which the first `triangles` are triangles. Each then has the child that it
     /// is, packed, in place of its first prim.
-    fn list(knots: &mut [Knot], triangles: u32) -> Self {
-        let count = |chunk: &[Knot]| {
-            let leaves = chunk.iter().filter(|knot| knot.is_leaf());
+    fn list(build_nodes: &mut [BuildNode], triangles: u32) -> Self {
+        let count = |chunk: &[BuildNode]| {
+            let leaves = chunk.iter().filter(|build_node| build_node.is_leaf());
             leaves.fold([0, 0], |[blocks, runs], leaf| {
                 let block = u32::from(leaf.at < triangles);
                 [blocks + block, runs + 1 - block]
             })
         };
-        let counts: Vec<[u32; 2]> = knots.par_chunks(KNOTS).map(count).collect();
+        let counts: Vec<[u32; 2]> = build_nodes.par_chunks(KNOTS).map(count).collect();
         let starts = counts.iter().scan([0, 0], |next, [blocks, runs]| {
             let start = *next;
             *next = [start[0] + blocks, start[1] + runs];
             Some(start)
         });
-        let chunks: Vec<(&mut [Knot], [u32; 2])> = knots.chunks_mut(KNOTS).zip(starts).collect();
+        let chunks: Vec<(&mut [BuildNode], [u32; 2])> = build_nodes.chunks_mut(KNOTS).zip(starts).collect();
         let lists: Vec<Self> = chunks.into_par_iter().map(|(c, start)| Self::list_from(start, c, triangles)).collect();
         let (blocks, runs) = lists.into_iter().map(|list| (list.blocks, list.runs)).unzip();
         Self { blocks: joined(blocks), runs: joined(runs) }
     }
 
-    /// Of some knots, before which so many blocks and runs stand.
-    fn list_from([blocks, runs]: [u32; 2], knots: &mut [Knot], triangles: u32) -> Self {
+    /// Of some build nodes, before which so many blocks and runs stand.
+    fn list_from([blocks, runs]: [u32; 2], build_nodes: &mut [BuildNode], triangles: u32) -> Self {
         let mut all = Self::default();
-        for knot in knots.iter_mut().filter(|knot| knot.is_leaf()) {
-            let Knot { at, count, .. } = *knot;
+        for build_node in build_nodes.iter_mut().filter(|build_node| build_node.is_leaf()) {
+            let BuildNode { at, count, .. } = *build_node;
             let child = if at < triangles {
                 all.blocks.push((at, count));
                 Child::Block(blocks + index(all.blocks.len() - 1), count)
@@ -203,7 +203,7 @@ impl Leaves {
                 all.runs.push((at - triangles, count));
                 Child::Run(runs + index(all.runs.len() - 1))
             };
-            knot.at = child.pack();
+            build_node.at = child.pack();
         }
         all
     }
@@ -229,7 +229,7 @@ fn block(shapes: &Shapes, prims: &[u32]) -> Block {
 
 #[cfg(test)]
 mod tests {
-    use super::knots::tests::{depth, leaves};
+    use super::build_nodes::tests::{depth, leaves};
     use super::*;
     use crate::accel::tests::scenes::mesh;
     use crate::accel::{SpherePrim, Wide};
@@ -277,8 +277,12 @@ mod tests {
             assert!(bytes[0] == bytes[1], "{splitting:?}");
             let checked = Wide::build(&shapes, splitting).check();
             assert!(checked.is_ok(), "{splitting:?}: {checked:?}");
-            let Binary { knots, depth: grown, .. } = binary_tree(&shapes, splitting, 1);
-            assert_eq!((grown, leaves(&knots).len()), (depth(&knots), knots.len().div_ceil(2)), "{splitting:?}");
+            let Binary { build_nodes, depth: grown, .. } = binary_tree(&shapes, splitting, 1);
+            assert_eq!(
+                (grown, leaves(&build_nodes).len()),
+                (depth(&build_nodes), build_nodes.len().div_ceil(2)),
+                "{splitting:?}"
+            );
         }
     }
 
@@ -293,8 +297,8 @@ mod tests {
         let shapes = mesh(vertices, faces);
         let pool = crate::threads::pool(2).unwrap();
         for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
-            let Binary { knots, depth: grown, .. } = pool.install(|| binary_tree(&shapes, splitting, 1));
-            assert_eq!(grown, depth(&knots));
+            let Binary { build_nodes, depth: grown, .. } = pool.install(|| binary_tree(&shapes, splitting, 1));
+            assert_eq!(grown, depth(&build_nodes));
             assert!(grown > 64, "{splitting:?}: {grown} levels are no deep tree");
             let checked = pool.install(|| Wide::build(&shapes, splitting).check());
             assert!(checked.is_ok(), "{splitting:?}, {grown} deep: {checked:?}");
@@ -310,10 +314,10 @@ mod tests {
         let faces = (0..side * (side - 1) - 1).map(|i| [i, i + 1, i + side].map(|v| v as u32)).collect();
         let shapes = mesh(vertices, faces);
         for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
-            let Binary { knots, depth: grown, .. } = binary_tree(&shapes, splitting, 1);
-            assert_eq!(grown, depth(&knots), "{splitting:?}");
+            let Binary { build_nodes, depth: grown, .. } = binary_tree(&shapes, splitting, 1);
+            assert_eq!(grown, depth(&build_nodes), "{splitting:?}");
             let deep = deepest(grown);
-            let improved = reinsert::improve(knots).1.unwrap_or(grown);
+            let improved = reinsert::improve(build_nodes).1.unwrap_or(grown);
             assert!(improved <= deep, "{splitting:?}: {improved}, places as good as another were taken for better");
             let arrays = build(&shapes, splitting, 1);
             let tree = arrays.tree();

@@ -1,16 +1,16 @@
 //! However the rays of a wave are traced, on whatever instruction set: the answers are those of brute force.
 
-use super::entrance::CROWD;
+use super::entry_point::GROUP;
 use super::flight::{DEPTH, FARTHEST_FIRST};
-use super::{ASKED, MANY, RayOrder, Splitting, Wide};
+use super::{ASKED, MANY, Splitting, TraceMode, Wide};
 use crate::accel::tests::Sieve;
 use crate::accel::tests::scenes::{self, ray};
-use crate::accel::{Accel, Gaps, Hit, Looking, NoProbe, Pencil, Ray, Shapes, Unculled};
+use crate::accel::{Accel, Hit, HitQueries, IntersectFilter, NoProbe, Pencil, Ray, Shapes, Unculled};
 use crate::math::Vec3;
 use crate::math::random::Random;
 use crate::math::simd::{Level, WIDE};
 
-const WAYS: [RayOrder; 4] = [RayOrder::OneByOne, RayOrder::InFlight, RayOrder::Packets, RayOrder::Adaptive];
+const WAYS: [TraceMode; 4] = [TraceMode::OneByOne, TraceMode::InFlight, TraceMode::Packets, TraceMode::Adaptive];
 
 /// First hits, the hits behind them, what is blocked, and what would be if some of the rest let light through.
 fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> String {
@@ -21,7 +21,7 @@ fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> String {
     let mut blocked = vec![false; rays.len()];
     accel.occluded(rays, &mut blocked, &mut scratch, &mut NoProbe);
     let mut stopped = vec![false; rays.len()];
-    accel.blocked(rays, Some(&Sieve), &mut stopped, &mut scratch, &mut NoProbe);
+    accel.occluded_filtered(rays, Some(&Sieve), &mut stopped, &mut scratch, &mut NoProbe);
     let bits = |hits: &[Hit]| hits.iter().map(Hit::bits).collect::<Vec<_>>();
     format!("{:?} {:?} {blocked:?} {stopped:?}", bits(&hits), bits(&behind))
 }
@@ -128,7 +128,7 @@ fn the_rays_of_a_pencil_hit_what_they_hit_one_by_one() {
 }
 
 /// Rays that start together hit what brute force hits, however they are traced.
-fn assert_a_pencil_hits(name: &str, shapes: &Shapes, rays: &[Ray], ways: &[RayOrder]) {
+fn assert_a_pencil_hits(name: &str, shapes: &Shapes, rays: &[Ray], ways: &[TraceMode]) {
     let Some(Ray { origin, .. }) = rays.first().copied() else { return };
     let dirs = [0, 1, 2].map(|k| rays.iter().map(|ray| ray.dir[k]).collect::<Vec<f32>>());
     let pencil = Pencil { origin, dirs: dirs.each_ref().map(Vec::as_slice) };
@@ -137,8 +137,8 @@ fn assert_a_pencil_hits(name: &str, shapes: &Shapes, rays: &[Ray], ways: &[RayOr
         for splitting in [Splitting::SurfaceArea, Splitting::Octree] {
             let wide = Wide::build(shapes, splitting).at_level(level).with_rays(way);
             let mut hits = vec![Hit::MISS; rays.len()];
-            let looking = Looking { pencil: Some(&pencil), ..Looking::along(rays) };
-            wide.look(&looking, &mut hits, &mut wide.scratch(), &mut NoProbe);
+            let queries = HitQueries { pencil: Some(&pencil), ..HitQueries::along(rays) };
+            wide.first_hits(&queries, &mut hits, &mut wide.scratch(), &mut NoProbe);
             let hits: Vec<_> = hits.iter().map(Hit::bits).collect();
             assert!(hits == expected, "{name}: {way:?} on {}", level.name());
         }
@@ -155,11 +155,11 @@ fn crowds_of_a_pencil_hit_what_brute_force_hits() {
             let width = [0.01, 0.1, 0.4][k % 3] * from.dir.length();
             let back = [0.0, 0.0, 5.0][k / 3 % 3];
             let start = ray(from.origin - from.dir * back, from.dir * if k % 7 == 6 { -1.0 } else { 1.0 });
-            let mut rays: Vec<Ray> = (0..2 * CROWD + 70)
-                .map(|i| Ray { dir: start.dir + random.cube() * (width * if i < CROWD { 1.0 } else { 0.3 }), ..start })
+            let mut rays: Vec<Ray> = (0..2 * GROUP + 70)
+                .map(|i| Ray { dir: start.dir + random.cube() * (width * if i < GROUP { 1.0 } else { 0.3 }), ..start })
                 .map(|ray| if ray.dir == Vec3::ZERO { start } else { ray })
                 .collect();
-            let odd = [CROWD + 3, 2 * CROWD - 1, 40];
+            let odd = [GROUP + 3, 2 * GROUP - 1, 40];
             for at in odd.into_iter().take(k % 4) {
                 let dir = rays[at].dir;
                 rays[at].dir = match k % 6 {
@@ -171,7 +171,7 @@ fn crowds_of_a_pencil_hit_what_brute_force_hits() {
                     _ => dir * 1e-30,
                 };
             }
-            assert_a_pencil_hits(name, &shapes, &rays, &[RayOrder::Packets]);
+            assert_a_pencil_hits(name, &shapes, &rays, &[TraceMode::Packets]);
         }
     }
 }
@@ -179,8 +179,8 @@ fn crowds_of_a_pencil_hit_what_brute_force_hits() {
 /// Rays find nothing where they meet some of what is not opaque.
 struct Lattice<'s>(&'s Shapes);
 
-impl Gaps for Lattice<'_> {
-    fn is_gap(&self, ray: usize, prim: u32) -> bool {
+impl IntersectFilter for Lattice<'_> {
+    fn rejects(&self, ray: usize, prim: u32) -> bool {
         assert!(!self.0.opaque.get_or_set(prim), "nobody asks of what is opaque");
         !(ray + prim as usize * 5).is_multiple_of(4)
     }
@@ -188,10 +188,10 @@ impl Gaps for Lattice<'_> {
 
 /// What rays are said to hit is what they hit behind gaps alone; how many hits were passed.
 fn passed(shapes: &Shapes, wide: &Wide, rays: &[Ray], after: Option<&[Hit]>, what: &str) -> usize {
-    let (brute, gaps) = (Unculled::new(shapes), Lattice(shapes));
+    let (brute, filter) = (Unculled::new(shapes), Lattice(shapes));
     let (mut hits, mut count) = (vec![Hit::MISS; rays.len()], 0);
-    let looking = Looking { rays, pencil: None, after, gaps: Some(&gaps) };
-    wide.look(&looking, &mut hits, &mut wide.scratch(), &mut NoProbe);
+    let queries = HitQueries { rays, pencil: None, after, filter: Some(&filter) };
+    wide.first_hits(&queries, &mut hits, &mut wide.scratch(), &mut NoProbe);
     for (i, (ray, hit)) in rays.iter().zip(&hits).enumerate() {
         let (mut before, mut met) = (after.map_or(Hit::BEFORE_ALL, |after| after[i]), [Hit::MISS]);
         loop {
@@ -199,8 +199,8 @@ fn passed(shapes: &Shapes, wide: &Wide, rays: &[Ray], after: Option<&[Hit]>, wha
             if met[0].bits() == hit.bits() {
                 break;
             }
-            let is_gap = met[0].is_some() && !shapes.opaque.get_or_set(met[0].prim) && gaps.is_gap(i, met[0].prim);
-            assert!(is_gap, "{what}: ray {i} hits {hit:?} and passes {:?}", met[0]);
+            let rejects = met[0].is_some() && !shapes.opaque.get_or_set(met[0].prim) && filter.rejects(i, met[0].prim);
+            assert!(rejects, "{what}: ray {i} hits {hit:?} and passes {:?}", met[0]);
             (before, count) = (met[0], count + 1);
         }
     }
@@ -242,25 +242,25 @@ fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not_and_there
     let shapes = scenes::soup(60, 0.4);
     let of = |rays: &[Ray]| {
         let mut hits = vec![Hit::MISS; rays.len()];
-        RayOrder::of(&crate::accel::wave::ForFirst {
+        TraceMode::of(&crate::accel::query_batch::ClosestBatch {
             rays,
             pencil: None,
-            gaps: None,
+            filter: None,
             hits: &mut hits,
             test: crate::accel::intersector::Exact,
         })
     };
     let mixed = scenes::rays(&shapes, 40);
-    assert_eq!((of(&mixed[..MANY]), of(&mixed[..MANY - 1])), (RayOrder::InFlight, RayOrder::OneByOne));
+    assert_eq!((of(&mixed[..MANY]), of(&mixed[..MANY - 1])), (TraceMode::InFlight, TraceMode::OneByOne));
     let toward = |k: usize| Ray { dir: Vec3::new(1.0, 2.0 + k as f32 * 0.01, 3.0), ..mixed[0] };
-    assert_eq!(of(&(0..64).map(toward).collect::<Vec<_>>()), RayOrder::Packets);
-    assert_eq!(of(&mixed[..9]), RayOrder::OneByOne);
+    assert_eq!(of(&(0..64).map(toward).collect::<Vec<_>>()), TraceMode::Packets);
+    assert_eq!(of(&mixed[..9]), TraceMode::OneByOne);
     // Of long waves some packets are asked, and not only the first.
     let long = |rays: &dyn Fn(usize) -> Ray| (0..WIDE * ASKED * 3).map(rays).collect::<Vec<_>>();
     let turning = |k: usize| mixed[k % mixed.len()];
     let half = |first: bool| move |k: usize| if (k < WIDE * ASKED) == first { toward(k % 64) } else { turning(k) };
-    assert_eq!((of(&long(&toward)), of(&long(&turning))), (RayOrder::Packets, RayOrder::InFlight));
-    assert_eq!((of(&long(&half(true))), of(&long(&half(false)))), (RayOrder::InFlight, RayOrder::Packets));
+    assert_eq!((of(&long(&toward)), of(&long(&turning))), (TraceMode::Packets, TraceMode::InFlight));
+    assert_eq!((of(&long(&half(true))), of(&long(&half(false)))), (TraceMode::InFlight, TraceMode::Packets));
 }
 
 #[test]

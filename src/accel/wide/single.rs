@@ -4,17 +4,17 @@ use std::marker::PhantomData;
 
 use super::best::Seeker;
 use super::node::{Child, Node, Tree};
-use super::ready::{Ready, ReadyRay};
-use super::settle::Settle;
+use super::pending_hits::PendingHits;
+use super::prepared::{PreparedRay, PreparedRays};
 use super::slabs::BoxMargins;
 use super::walk::{Entry, ask_by_itself};
 use crate::accel::Shapes;
 use crate::accel::query::Goal;
-use crate::accel::wave::Wave;
+use crate::accel::query_batch::QueryBatch;
 use crate::math::simd::{Kernel, LANES, Simd};
 
 /// A wave of rays.
-pub(super) struct Alone<'w, W, B> {
+pub(super) struct TraceSingle<'w, W, B> {
     pub tree: &'w Tree<'w>,
     pub shapes: &'w Shapes,
     pub wave: &'w mut W,
@@ -22,13 +22,13 @@ pub(super) struct Alone<'w, W, B> {
     pub margins: PhantomData<B>,
 }
 
-impl<W: Wave, B: BoxMargins> Kernel for Alone<'_, W, B> {
+impl<W: QueryBatch, B: BoxMargins> Kernel for TraceSingle<'_, W, B> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let Self { tree, shapes, wave, stack, .. } = self;
-        let mut lone = Lone::default();
+        let mut lone = SingleRays::default();
         for start in (0..wave.rays().len()).step_by(LANES) {
             lone.trace::<B, _, _>(s, tree, shapes, wave, (start, u32::MAX), stack);
         }
@@ -38,15 +38,15 @@ impl<W: Wave, B: BoxMargins> Kernel for Alone<'_, W, B> {
 
 /// Rays that go alone, eight made ready and eight answered together.
 #[derive(Default)]
-pub(super) struct Lone {
-    ready: Ready,
-    settle: Settle,
+pub(super) struct SingleRays {
+    ready: PreparedRays,
+    pending: PendingHits,
 }
 
-impl Lone {
+impl SingleRays {
     /// Of eight rays of a wave from `start` on, or as many as there are, traces those of a mask.
     #[inline(always)]
-    pub(super) fn trace<B: BoxMargins, S: Simd, W: Wave>(
+    pub(super) fn trace<B: BoxMargins, S: Simd, W: QueryBatch>(
         &mut self,
         s: S,
         tree: &Tree,
@@ -72,25 +72,25 @@ impl Lone {
             } else {
                 descend::<B, _, _>(s, tree, shapes, wave, ray, &mut seeker, stack);
             }
-            self.settle.answer(s, tree, wave, i, seeker.found());
+            self.pending.answer(s, tree, wave, i, seeker.found());
         }
     }
 
     /// Answers those that wait for it.
     #[inline(always)]
-    pub(super) fn finish<S: Simd, W: Wave>(&mut self, s: S, wave: &mut W) {
-        self.settle.finish(s, wave);
+    pub(super) fn finish<S: Simd, W: QueryBatch>(&mut self, s: S, wave: &mut W) {
+        self.pending.finish(s, wave);
     }
 }
 
 /// From the root to every leaf that the ray may hit, the nearest first.
 #[inline(always)]
-fn descend<B: BoxMargins, S: Simd, W: Wave>(
+fn descend<B: BoxMargins, S: Simd, W: QueryBatch>(
     s: S,
     tree: &Tree,
     shapes: &Shapes,
     wave: &W,
-    ray: &ReadyRay,
+    ray: &PreparedRay,
     seeker: &mut Seeker,
     stack: &mut [Entry],
 ) {
@@ -117,12 +117,12 @@ fn descend<B: BoxMargins, S: Simd, W: Wave>(
 /// The same for a ray that any hit answers: how far it looks never changes, so that children need no distances, and to put
 /// them in order takes longer than it saves.
 #[inline(always)]
-fn descend_any<B: BoxMargins, S: Simd, W: Wave>(
+fn descend_any<B: BoxMargins, S: Simd, W: QueryBatch>(
     s: S,
     tree: &Tree,
     shapes: &Shapes,
     wave: &W,
-    ray: &ReadyRay,
+    ray: &PreparedRay,
     seeker: &mut Seeker,
     stack: &mut [Entry],
 ) {

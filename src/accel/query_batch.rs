@@ -1,11 +1,11 @@
-//! Rays that are asked together: the three questions, and where their answers go.
+//! Batches of rays that ask the same query: the three queries, and where their answers go.
 //!
-//! A structure may ask the rays of a wave in any order and in any number at once.
+//! A structure may trace the rays of a batch in any order and in any number at once.
 
 use std::ops::Range;
 
 use super::query::{Closest, Goal, Next, Occluded, Query};
-use super::{Gaps, Hit, Holes, Intersector, NO_PRIM, Probe, Ray, Shapes};
+use super::{Hit, IntersectFilter, Intersector, NO_PRIM, OccludedFilter, Probe, Ray, Shapes};
 use crate::math::Vec3;
 use crate::math::simd::{LANES, Row};
 
@@ -44,8 +44,8 @@ impl Pencil<'_> {
     }
 }
 
-/// Rays that are asked the same question, and where the answers go.
-pub trait Wave {
+/// Rays that ask the same query, and where the answers go.
+pub trait QueryBatch {
     /// What they look for.
     type Goal: Goal;
 
@@ -80,9 +80,9 @@ pub trait Wave {
         None
     }
 
-    /// Who knows where its rays pass prims that are not there, if anybody is asked.
+    /// What rejects hits of its rays, if anything does.
     #[inline(always)]
-    fn gaps(&self) -> Option<&dyn Gaps> {
+    fn filter(&self) -> Option<&dyn IntersectFilter> {
         None
     }
 
@@ -102,15 +102,15 @@ pub trait Wave {
     fn answer(&mut self, i: usize, query: &Query<Self::Goal>) -> bool;
 }
 
-pub(super) struct ForFirst<'w, I> {
+pub(super) struct ClosestBatch<'w, I> {
     pub rays: &'w [Ray],
     pub pencil: Option<Pencil<'w>>,
-    pub gaps: Option<&'w dyn Gaps>,
+    pub filter: Option<&'w dyn IntersectFilter>,
     pub hits: &'w mut [Hit],
     pub test: I,
 }
 
-impl<'w, I: Intersector> Wave for ForFirst<'w, I> {
+impl<'w, I: Intersector> QueryBatch for ClosestBatch<'w, I> {
     type Goal = Closest<'w, I>;
 
     #[inline(always)]
@@ -137,13 +137,13 @@ impl<'w, I: Intersector> Wave for ForFirst<'w, I> {
     }
 
     #[inline(always)]
-    fn gaps(&self) -> Option<&dyn Gaps> {
-        self.gaps
+    fn filter(&self) -> Option<&dyn IntersectFilter> {
+        self.filter
     }
 
     #[inline(always)]
     fn goal(&self, i: usize) -> Closest<'w, I> {
-        Closest::nothing(self.test).passing(self.gaps, i)
+        Closest::nothing(self.test).passing(self.filter, i)
     }
 
     #[inline(always)]
@@ -163,14 +163,14 @@ impl<'w, I: Intersector> Wave for ForFirst<'w, I> {
     }
 }
 
-pub(super) struct ForAny<'w, I> {
+pub(super) struct OccludedBatch<'w, I> {
     pub rays: &'w [Ray],
-    pub holes: Option<&'w dyn Holes>,
+    pub filter: Option<&'w dyn OccludedFilter>,
     pub blocked: &'w mut [bool],
     pub test: I,
 }
 
-impl<'w, I: Intersector> Wave for ForAny<'w, I> {
+impl<'w, I: Intersector> QueryBatch for OccludedBatch<'w, I> {
     type Goal = Occluded<'w, I>;
 
     #[inline(always)]
@@ -180,7 +180,7 @@ impl<'w, I: Intersector> Wave for ForAny<'w, I> {
 
     #[inline(always)]
     fn goal(&self, i: usize) -> Occluded<'w, I> {
-        Occluded::by(self.holes, i, self.test)
+        Occluded::by(self.filter, i, self.test)
     }
 
     #[inline(always)]
@@ -201,15 +201,15 @@ impl<'w, I: Intersector> Wave for ForAny<'w, I> {
     }
 }
 
-pub(super) struct ForNext<'w, I> {
+pub(super) struct NextBatch<'w, I> {
     pub rays: &'w [Ray],
     pub after: &'w [Hit],
-    pub gaps: Option<&'w dyn Gaps>,
+    pub filter: Option<&'w dyn IntersectFilter>,
     pub hits: &'w mut [Hit],
     pub test: I,
 }
 
-impl<'w, I: Intersector> Wave for ForNext<'w, I> {
+impl<'w, I: Intersector> QueryBatch for NextBatch<'w, I> {
     type Goal = Next<'w, I>;
 
     #[inline(always)]
@@ -230,13 +230,13 @@ impl<'w, I: Intersector> Wave for ForNext<'w, I> {
     }
 
     #[inline(always)]
-    fn gaps(&self) -> Option<&dyn Gaps> {
-        self.gaps
+    fn filter(&self) -> Option<&dyn IntersectFilter> {
+        self.filter
     }
 
     #[inline(always)]
     fn goal(&self, i: usize) -> Next<'w, I> {
-        Next::after(&self.after[i], Closest::nothing(self.test).passing(self.gaps, i))
+        Next::after(&self.after[i], Closest::nothing(self.test).passing(self.filter, i))
     }
 
     #[inline(always)]
@@ -258,7 +258,7 @@ impl<'w, I: Intersector> Wave for ForNext<'w, I> {
 
 /// The query of a ray of a wave, and whether it can hit anything. [`Query::test_planes`] comes next.
 #[inline(always)]
-pub fn begin<'a, W: Wave, P: Probe>(
+pub fn begin<'a, W: QueryBatch, P: Probe>(
     shapes: &'a Shapes,
     wave: &W,
     i: usize,
@@ -270,7 +270,7 @@ pub fn begin<'a, W: Wave, P: Probe>(
 
 /// Gives the answer that was found.
 #[inline(always)]
-pub fn end<W: Wave, P: Probe>(wave: &mut W, i: usize, query: &Query<W::Goal>, probe: &mut P) {
+pub fn end<W: QueryBatch, P: Probe>(wave: &mut W, i: usize, query: &Query<W::Goal>, probe: &mut P) {
     if wave.answer(i, query) {
         probe.found();
     }

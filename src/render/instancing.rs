@@ -1,7 +1,7 @@
-//! Which meshes are kept as objects that stand in several places, and which are flattened.
+//! Which meshes are instanced, stored once as objects that stand in several places, and which are flattened.
 
-use crate::accel::instances::{Object, Place};
-use crate::accel::{Cone, Kept};
+use crate::accel::instances::{Object, ObjectTransform};
+use crate::accel::{Cone, InstancedObjects};
 use crate::math::DAffine3;
 use crate::named::names;
 use crate::scene::{Mesh, Scene};
@@ -10,10 +10,10 @@ use rayon::prelude::*;
 /// What becomes of meshes with several instances. What rays hit is the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Instancing {
-    /// They are kept where that saves much memory.
+    /// Each mesh is stored once where that saves much memory.
     #[default]
     Auto,
-    /// They are kept.
+    /// Each mesh is stored once.
     Keep,
     /// Each instance is stored by itself.
     Flatten,
@@ -24,19 +24,19 @@ names!(Instancing, "way with instances", Auto => "auto", Keep => "keep", Flatten
 /// Triangles from which on a mesh is worth a tree of its own, where nobody says so.
 const WORTH_A_TREE: usize = 64;
 
-/// Triangles that keeping must save: flattened, so many take 20 MB with the tree over them, and rays through one tree are
+/// Triangles that instancing must save: flattened, so many take 20 MB with the tree over them, and rays through one tree are
 /// sooner answered than through two.
 const WORTH_KEEPING: usize = 1 << 18;
 
 /// The objects of a scene, and where instances of them stand.
-pub(super) struct Keeping {
+pub(super) struct InstancePlan {
     /// All objects, which stand nowhere yet.
-    pub kept: Kept,
+    pub instanced: InstancedObjects,
     /// For each instance the index of its object and its place; `None`: it is flattened.
-    pub places: Vec<Option<(u32, Place)>>,
+    pub places: Vec<Option<(u32, ObjectTransform)>>,
 }
 
-impl Keeping {
+impl InstancePlan {
     /// Chooses, and finds where instances stand; those that stand in no ordinary way are flattened all the same.
     /// `opaque` tells of each mesh whether it stops light, `to_frame` moves an instance into the scene's frame.
     pub(super) fn of(
@@ -45,26 +45,26 @@ impl Keeping {
         opaque: impl Fn(usize) -> bool,
         to_frame: impl Fn(&DAffine3) -> DAffine3 + Sync,
     ) -> Self {
-        let mut kept = Kept::default();
+        let mut instanced = InstancedObjects::default();
         let mut objects: Vec<Option<u32>> = vec![None; scene.meshes.len()];
         for i in chosen(scene, how) {
             let mesh = &scene.meshes[i];
-            objects[i] = Some(kept.add(Object::new(&mesh.positions, &mesh.triangles, opaque(i))));
+            objects[i] = Some(instanced.add(Object::new(&mesh.positions, &mesh.triangles, opaque(i))));
         }
-        if kept.objects().is_empty() {
-            return Self { kept, places: vec![None; scene.instances.len()] };
+        if instanced.objects().is_empty() {
+            return Self { instanced, places: vec![None; scene.instances.len()] };
         }
         let place = |instance: &crate::scene::Instance| {
             let object = objects[instance.mesh as usize]?;
-            let shapes = kept.objects()[object as usize].shapes();
-            Some((object, Place::new(to_frame(&instance.world_from_object), shapes)?))
+            let shapes = instanced.objects()[object as usize].shapes();
+            Some((object, ObjectTransform::new(to_frame(&instance.world_from_object), shapes)?))
         };
         let places = scene.instances.par_iter().map(place).collect();
-        Self { kept, places }
+        Self { instanced, places }
     }
 }
 
-/// The meshes that are kept.
+/// The meshes that are instanced.
 fn chosen(scene: &Scene, how: Instancing) -> Vec<usize> {
     let least = match how {
         Instancing::Auto => WORTH_A_TREE,
@@ -79,8 +79,8 @@ fn chosen(scene: &Scene, how: Instancing) -> Vec<usize> {
     if how == Instancing::Auto && saved < WORTH_KEEPING { Vec::new() } else { chosen }
 }
 
-/// Bytes of shapes as they are stored, kept objects with them.
-pub(super) fn bytes(shapes: &crate::accel::Shapes, kept: &Kept) -> usize {
+/// Bytes of shapes as they are stored, instanced objects with them.
+pub(super) fn bytes(shapes: &crate::accel::Shapes, instanced: &InstancedObjects) -> usize {
     size_of_val(&*shapes.vertices)
         + size_of_val(&*shapes.triangles)
         + size_of_val(&*shapes.polygons)
@@ -88,5 +88,5 @@ pub(super) fn bytes(shapes: &crate::accel::Shapes, kept: &Kept) -> usize {
         + size_of_val(&*shapes.spheres)
         + shapes.cones.len() * size_of::<Cone>()
         + size_of_val(&*shapes.planes)
-        + kept.bytes()
+        + instanced.bytes()
 }

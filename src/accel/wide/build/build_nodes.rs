@@ -1,18 +1,18 @@
-//! A binary tree as an array of knots, and while it grows.
+//! A binary tree as an array of build nodes, and while it grows.
 
 use crate::math::Vec3;
 use crate::math::aabb::Aabb;
 use crate::parts::joined;
 use bytemuck::Zeroable;
 
-/// Pieces of no more knots are put together.
+/// Pieces of no more build nodes are put together.
 const PIECE: usize = 256;
 
 /// A node of the binary tree. They stand in an array, each followed by all that is below it, first side first.
 #[derive(Clone, Copy, Debug, Zeroable)]
-pub(super) struct Knot {
+pub(super) struct BuildNode {
     pub lo: Vec3,
-    /// Of a leaf the first of its prims, in the end the packed child that it is; of another knot how many knots further on
+    /// Of a leaf the first of its prims, in the end the packed child that it is; of another build node how many build nodes further on
     /// its second side is.
     pub at: u32,
     pub hi: Vec3,
@@ -20,7 +20,7 @@ pub(super) struct Knot {
     pub count: u32,
 }
 
-impl Knot {
+impl BuildNode {
     pub(super) fn leaf(bounds: Aabb, first: u32, count: u32) -> Self {
         Self { lo: bounds.lo, at: first, hi: bounds.hi, count }
     }
@@ -47,20 +47,20 @@ impl Knot {
     }
 }
 
-/// A tree while it grows: its knots in their order, in pieces that are not moved until it is known how many there are.
+/// A tree while it grows: its build nodes in their order, in pieces that are not moved until it is known how many there are.
 #[derive(Default)]
-pub(super) struct Growth {
-    pieces: Vec<Vec<Knot>>,
-    /// The last piece, which knots are added to.
-    open: Vec<Knot>,
+pub(super) struct TreeBuilder {
+    pieces: Vec<Vec<BuildNode>>,
+    /// The last piece, which build nodes are added to.
+    open: Vec<BuildNode>,
     /// Knots above the next one.
     above: usize,
     /// Knots on the longest way down.
     depth: usize,
 }
 
-impl Growth {
-    /// Begins below so many knots.
+impl TreeBuilder {
+    /// Begins below so many build nodes.
     fn below(above: usize) -> Self {
         Self { above, ..Self::default() }
     }
@@ -69,16 +69,16 @@ impl Growth {
         self.pieces.iter().chain([&self.open]).map(Vec::len).sum()
     }
 
-    /// Adds a knot over what `first` and `second` add, of which neither shares its work with another thread.
+    /// Adds a build node over what `first` and `second` add, of which neither shares its work with another thread.
     pub(super) fn fork(&mut self, bounds: Aabb, first: impl FnOnce(&mut Self), second: impl FnOnce(&mut Self)) {
         let (at, pieces) = (self.open.len(), self.pieces.len());
-        self.add(Knot::fork(bounds, 0));
+        self.add(BuildNode::fork(bounds, 0));
         self.above += 1;
         first(self);
         self.open[at].at = index(self.open.len() - at);
         second(self);
         self.above -= 1;
-        debug_assert_eq!(pieces, self.pieces.len(), "a knot that was not shared went to another piece");
+        debug_assert_eq!(pieces, self.pieces.len(), "a build_node that was not shared went to another piece");
     }
 
     /// The same by two threads.
@@ -89,7 +89,7 @@ impl Growth {
         second: impl FnOnce(&mut Self) + Send,
     ) {
         let before = self.len();
-        self.add(Knot::fork(bounds, 0));
+        self.add(BuildNode::fork(bounds, 0));
         self.close();
         let last = self.pieces.len() - 1;
         let at = self.pieces[last].len() - 1;
@@ -104,15 +104,15 @@ impl Growth {
         self.depth = self.depth.max(beyond.depth);
     }
 
-    pub(super) fn add(&mut self, knot: Knot) {
+    pub(super) fn add(&mut self, build_node: BuildNode) {
         self.depth = self.depth.max(self.above + 1);
-        self.open.push(knot);
+        self.open.push(build_node);
     }
 
-    /// Makes room for so many knots where a piece begins.
-    pub(super) fn begin(&mut self, knots: usize) {
+    /// Makes room for so many build nodes where a piece begins.
+    pub(super) fn begin(&mut self, build_nodes: usize) {
         if self.open.capacity() == 0 {
-            self.open.reserve(knots);
+            self.open.reserve(build_nodes);
         }
     }
 
@@ -123,21 +123,24 @@ impl Growth {
     }
 
     /// Puts a piece behind the others.
-    fn put(&mut self, piece: Vec<Knot>) {
+    fn put(&mut self, piece: Vec<BuildNode>) {
         match self.pieces.last_mut() {
             Some(last) if last.len() + piece.len() <= PIECE => last.extend(piece),
             _ => self.pieces.push(piece),
         }
     }
 
-    /// All knots, and how many are on the longest way down.
-    pub(super) fn finish(mut self) -> (Vec<Knot>, usize) {
+    /// All build nodes, and how many are on the longest way down.
+    pub(super) fn finish(mut self) -> (Vec<BuildNode>, usize) {
         self.close();
         (joined(self.pieces), self.depth)
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "knots are fewer than twice the prims, and take 32 bytes each")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "build_nodes are fewer than twice the prims, and take 32 bytes each"
+)]
 pub(super) fn index(i: usize) -> u32 {
     i as u32
 }
@@ -147,36 +150,36 @@ pub(super) mod tests {
     use super::*;
 
     /// A leaf of one prim: a cube from `lo` to `hi` on every axis.
-    pub(in super::super) fn leaf(prim: u32, lo: f32, hi: f32) -> Vec<Knot> {
-        vec![Knot::leaf(Aabb { lo: Vec3::splat(lo), hi: Vec3::splat(hi) }, prim, 1)]
+    pub(in super::super) fn leaf(prim: u32, lo: f32, hi: f32) -> Vec<BuildNode> {
+        vec![BuildNode::leaf(Aabb { lo: Vec3::splat(lo), hi: Vec3::splat(hi) }, prim, 1)]
     }
 
-    /// A knot over two trees.
-    pub(in super::super) fn fork(first: Vec<Knot>, second: Vec<Knot>) -> Vec<Knot> {
-        let root = Knot::fork(first[0].bounds().union(second[0].bounds()), index(first.len() + 1));
+    /// A build node over two trees.
+    pub(in super::super) fn fork(first: Vec<BuildNode>, second: Vec<BuildNode>) -> Vec<BuildNode> {
+        let root = BuildNode::fork(first[0].bounds().union(second[0].bounds()), index(first.len() + 1));
         [vec![root], first, second].concat()
     }
 
     /// The first prim of each leaf; every box is the smallest around what is below it.
-    pub(in super::super) fn leaves(knots: &[Knot]) -> Vec<u32> {
-        let root = &knots[0];
+    pub(in super::super) fn leaves(build_nodes: &[BuildNode]) -> Vec<u32> {
+        let root = &build_nodes[0];
         if root.is_leaf() {
-            assert_eq!(knots.len(), 1);
+            assert_eq!(build_nodes.len(), 1);
             return vec![root.at];
         }
-        let (first, second) = knots[1..].split_at(root.at as usize - 1);
+        let (first, second) = build_nodes[1..].split_at(root.at as usize - 1);
         assert_eq!(first[0].bounds().union(second[0].bounds()), root.bounds());
         [leaves(first), leaves(second)].concat()
     }
 
     /// Knots on the longest way down.
-    pub(in super::super) fn depth(knots: &[Knot]) -> usize {
+    pub(in super::super) fn depth(build_nodes: &[BuildNode]) -> usize {
         let (mut left, mut most) = (vec![(0, 1)], 0);
         while let Some((i, depth)) = left.pop() {
-            let knot = &knots[i];
+            let build_node = &build_nodes[i];
             most = most.max(depth);
-            if !knot.is_leaf() {
-                left.extend([(i + knot.at as usize, depth + 1), (i + 1, depth + 1)]);
+            if !build_node.is_leaf() {
+                left.extend([(i + build_node.at as usize, depth + 1), (i + 1, depth + 1)]);
             }
         }
         most
@@ -184,17 +187,17 @@ pub(super) mod tests {
 
     /// Adds a tree over so many leaves, of which the first has this number, cut anywhere, and shared where it has more than so
     /// many.
-    fn grow(growth: &mut Growth, first: u32, leaves: u32, shared: u32, seed: u64) {
+    fn grow(growth: &mut TreeBuilder, first: u32, leaves: u32, shared: u32, seed: u64) {
         let bounds =
             |first: u32, leaves: u32| Aabb { lo: Vec3::splat(first as f32), hi: Vec3::splat((first + leaves) as f32) };
         if leaves == 1 {
-            return growth.add(Knot::leaf(bounds(first, 1), first, 1));
+            return growth.add(BuildNode::leaf(bounds(first, 1), first, 1));
         }
         let mut random = crate::math::random::Random::new(seed ^ u64::from(first) << 32 ^ u64::from(leaves));
         // Every other cut takes off a leaf alone.
         let cut = if random.below(2) == 0 { 1 } else { 1 + random.below(leaves as usize - 1) as u32 };
         let sides = [(first, cut), (first + cut, leaves - cut)];
-        let [a, b] = sides.map(|(first, leaves)| move |g: &mut Growth| grow(g, first, leaves, shared, seed));
+        let [a, b] = sides.map(|(first, leaves)| move |g: &mut TreeBuilder| grow(g, first, leaves, shared, seed));
         if leaves > shared {
             growth.fork_shared(bounds(first, leaves), a, b);
         } else {
@@ -208,7 +211,7 @@ pub(super) mod tests {
         for seed in 0..20 {
             for count in [1, 2, 3, 700, 5000] {
                 let grown = |shared: u32| {
-                    let mut growth = Growth::default();
+                    let mut growth = TreeBuilder::default();
                     grow(&mut growth, 0, count, shared, seed);
                     growth.finish()
                 };
@@ -216,9 +219,14 @@ pub(super) mod tests {
                 assert!(leaves(&alone).into_iter().eq(0..count));
                 assert_eq!(deepest, depth(&alone));
                 for shared in [1, 40, 1000] {
-                    let (knots, depth) = grown(shared);
-                    let all = |knots: &[Knot]| knots.iter().map(|k| (k.lo, k.hi, k.at, k.count)).collect::<Vec<_>>();
-                    assert!(depth == deepest && all(&knots) == all(&alone), "{seed}: {count} shared from {shared} on");
+                    let (build_nodes, depth) = grown(shared);
+                    let all = |build_nodes: &[BuildNode]| {
+                        build_nodes.iter().map(|k| (k.lo, k.hi, k.at, k.count)).collect::<Vec<_>>()
+                    };
+                    assert!(
+                        depth == deepest && all(&build_nodes) == all(&alone),
+                        "{seed}: {count} shared from {shared} on"
+                    );
                 }
             }
         }

@@ -7,17 +7,18 @@ use crate::math::Vec3;
 use crate::math::bounds::PARALLEL;
 use crate::math::simd::{LANES, Pick, Row, Simd};
 
-/// Linear bounds of the distances at which any of the rays meets a plane: below those of planes that come first, where
-/// they are not below zero, and above those of planes that come last, where these are not.
+/// Linear bounds of the distances at which any of the rays meets a plane across an axis: from below for planes by which rays
+/// enter, from above for those by which they leave; valid where these are not below zero (S. Boulos, I. Wald, P. Shirley,
+/// *Geometric and Arithmetic Culling Methods for Entire Ray Packets*, 2006).
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Hull {
+pub(super) struct IntervalRay {
     /// By axis: what a plane is multiplied with, and what is added.
     first: [[f32; 2]; 3],
     last: [[f32; 2]; 3],
     from: f32,
 }
 
-impl Hull {
+impl IntervalRay {
     /// Of rays to one octant whose origins and reciprocals of directions ([`Padding`](super::padded::Padding)) lie between
     /// these, with hits from `from` on.
     #[inline(always)]
@@ -28,7 +29,7 @@ impl Hull {
         [low, high]: [Vec3; 2],
         from: f32,
     ) -> Self {
-        let mut hull = Self { from, ..Self::default() };
+        let mut interval = Self { from, ..Self::default() };
         let farthest = low.abs().max(high.abs());
         let drift = PARALLEL * (tree.extent + farthest.element_sum());
         for k in 0..3 {
@@ -39,10 +40,10 @@ impl Hull {
             } else {
                 (least[k], greatest[k], high[k], low[k])
             };
-            hull.first[k] = [fast, -front * fast - pad * fast.abs()];
-            hull.last[k] = [slow, -rear * slow + pad * slow.abs()];
+            interval.first[k] = [fast, -front * fast - pad * fast.abs()];
+            interval.last[k] = [slow, -rear * slow + pad * slow.abs()];
         }
-        hull
+        interval
     }
 
     /// The least size of a reciprocal along an axis.

@@ -1,24 +1,24 @@
-//! Where the rays of a pencil enter the tree, many at a time.
+//! Entry points: where the rays of a pencil enter the tree, many at a time.
 //!
-//! Packets that follow each other meet the same boxes near the root. So these are asked once about all rays of a crowd of
+//! Packets that follow each other meet the same boxes near the root. So these are asked once about all rays of a group of
 //! packets, and what is left is laid out as one node more, from which each packet goes on (after A. Reshetov, A. Soupikov and
 //! J. Hurley, *Multi-Level Ray Tracing Algorithm*, 2005).
 
-use super::bundle::all;
 use super::flight::FARTHEST_FIRST;
-use super::hull::Hull;
+use super::interval_ray::IntervalRay;
 use super::node::{Child, Node, Tree};
+use super::packet_rays::all;
 use super::slabs::BoxMargins;
-use crate::accel::wave::Pencil;
+use crate::accel::query_batch::Pencil;
 use crate::math::Vec3;
 use crate::math::bounds::{BOX_RANGE, PARALLEL};
 use crate::math::simd::{LANES, Lanewise, Simd, WIDE};
 
 /// Rays that enter together: of eight broad packets.
-pub(super) const CROWD: usize = 256;
+pub(super) const GROUP: usize = 256;
 
-/// The entrance of one crowd.
-pub(super) struct Entrance {
+/// The entry point of one group of rays.
+pub(super) struct EntryPoint {
     /// What any of the rays may meet, the nearest where their octant looks first.
     pub node: Node,
     /// The rays: up to the one before this.
@@ -26,7 +26,7 @@ pub(super) struct Entrance {
     pub state: State,
 }
 
-/// What is known of a crowd.
+/// What is known of a group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum State {
     /// Its rays enter by the root.
@@ -44,19 +44,19 @@ struct Spot {
     slot: usize,
 }
 
-/// Bounds of the directions of a crowd.
+/// Bounds of the directions of a group.
 struct Directions {
     octant: usize,
     /// Least and greatest reciprocals.
     inverse: [Vec3; 2],
 }
 
-impl Entrance {
+impl EntryPoint {
     pub(super) fn new() -> Self {
         Self { node: Node::EMPTY, end: 0, state: State::Unknown }
     }
 
-    /// Whether the next ray is the first of a crowd.
+    /// Whether the next ray is the first of a group.
     #[inline(always)]
     pub(super) fn is_passed(&self, start: usize) -> bool {
         start >= self.end
@@ -65,27 +65,27 @@ impl Entrance {
     /// Where so many rays enter.
     #[inline(always)]
     pub(super) fn of(&self, start: usize, count: usize) -> u32 {
-        if self.state == State::Unknown || start + count > self.end { 0 } else { Child::ENTRANCE }
+        if self.state == State::Unknown || start + count > self.end { 0 } else { Child::ENTRY_POINT }
     }
 
-    /// Finds the entrance of the crowd that begins here, if there are as many rays.
+    /// Finds the entry point of the group that begins here, if there are as many rays.
     #[inline(always)]
     pub(super) fn find<B: BoxMargins, S: Simd>(&mut self, s: S, tree: &Tree, pencil: &Pencil, start: usize) {
-        (self.end, self.state) = (start + CROWD, State::Unknown);
+        (self.end, self.state) = (start + GROUP, State::Unknown);
         let whole = tree.extent + pencil.origin.abs().element_sum();
         if !(1.0 / BOX_RANGE..=BOX_RANGE).contains(&whole) {
             return;
         }
         let Some(Directions { octant, inverse }) = Directions::of(s.wide(), pencil, start) else { return };
-        let hull = Hull::new::<B>(tree, octant, inverse, [pencil.origin; 2], 0.0);
-        self.state = self.open(s, tree, &hull, octant);
+        let interval = IntervalRay::new::<B>(tree, octant, inverse, [pencil.origin; 2], 0.0);
+        self.state = self.open(s, tree, &interval, octant);
     }
 
     /// Opens node after node as long as there is room for what is found in them.
     #[inline(always)]
-    fn open<S: Simd>(&mut self, s: S, tree: &Tree, hull: &Hull, octant: usize) -> State {
+    fn open<S: Simd>(&mut self, s: S, tree: &Tree, interval: &IntervalRay, octant: usize) -> State {
         let mut spots = [Spot::default(); LANES];
-        let mut count = put(&mut spots, 0, 0, octant, met(s, tree, hull, octant, 0));
+        let mut count = put(&mut spots, 0, 0, octant, met(s, tree, interval, octant, 0));
         let mut opened = true;
         while opened {
             opened = false;
@@ -95,7 +95,7 @@ impl Entrance {
                 let child = tree.nodes[spot.node as usize].children[spot.slot % LANES];
                 let room = LANES + 1 + i - behind - kept;
                 if !Child::is_leaf(child) {
-                    let met = met(s, tree, hull, octant, child);
+                    let met = met(s, tree, interval, octant, child);
                     if met.count_ones() as usize <= room {
                         kept = put(&mut spots, kept, child, octant, met);
                         opened = true;
@@ -123,10 +123,10 @@ impl Entrance {
     }
 }
 
-/// Which children of a node any ray of a hull may meet.
+/// Which children of a node any ray of a interval may meet.
 #[inline(always)]
-fn met<S: Simd>(s: S, tree: &Tree, hull: &Hull, octant: usize, node: u32) -> usize {
-    hull.meets(s, &tree.nodes[node as usize].planes, octant, f32::INFINITY).1 as usize % 256
+fn met<S: Simd>(s: S, tree: &Tree, interval: &IntervalRay, octant: usize, node: u32) -> usize {
+    interval.meets(s, &tree.nodes[node as usize].planes, octant, f32::INFINITY).1 as usize % 256
 }
 
 /// Puts the children of a node in a mask behind others, the nearest first; how many there are then.
@@ -142,10 +142,10 @@ fn put(spots: &mut [Spot; LANES], mut count: usize, node: u32, octant: usize, me
 }
 
 impl Directions {
-    /// Of a crowd of a pencil, if it is one: rays to one octant, with numbers for which the bounds of padded boxes hold.
+    /// Of a group of a pencil, if it is one: rays to one octant, with numbers for which the bounds of padded boxes hold.
     #[inline(always)]
     fn of<T: Lanewise<WIDE>>(s: T, pencil: &Pencil, start: usize) -> Option<Self> {
-        let [x, y, z] = pencil.dirs.map(|row| row.get(start..start + CROWD));
+        let [x, y, z] = pencil.dirs.map(|row| row.get(start..start + GROUP));
         let rows = [x?, y?, z?].map(|row| row.as_chunks::<WIDE>().0);
         let [infinite, zero] = [s.splat(f32::INFINITY), s.splat(0.0)];
         let (mut least, mut greatest, mut sum) = ([infinite; 3], [s.sub(zero, infinite); 3], zero);

@@ -1,9 +1,9 @@
 //! Exact distances and weights of hits that are known, eight rays at a time.
 
-use super::best::Place;
+use super::best::TriangleSlot;
 use super::node::Tree;
 use crate::accel::query::Goal;
-use crate::accel::wave::Wave;
+use crate::accel::query_batch::QueryBatch;
 use crate::accel::{Hit, NO_PRIM};
 use crate::math::meetings::Pairs;
 use crate::math::shear::RaySpace;
@@ -12,7 +12,7 @@ use crate::math::triangle;
 use crate::math::triangles::corners_of;
 
 /// Rays whose hits wait for their distances.
-pub(super) struct Settle {
+pub(super) struct PendingHits {
     pairs: Pairs,
     /// Their numbers in the wave, and what they hit.
     rays: [usize; LANES],
@@ -20,16 +20,23 @@ pub(super) struct Settle {
     count: usize,
 }
 
-impl Default for Settle {
+impl Default for PendingHits {
     fn default() -> Self {
         Self { pairs: Pairs::EMPTY, rays: [0; LANES], prims: [0; LANES], count: 0 }
     }
 }
 
-impl Settle {
+impl PendingHits {
     /// Gives a ray its answer, now or with others.
     #[inline(always)]
-    pub(super) fn answer<S: Simd, W: Wave>(&mut self, s: S, tree: &Tree, wave: &mut W, i: usize, place: Place) {
+    pub(super) fn answer<S: Simd, W: QueryBatch>(
+        &mut self,
+        s: S,
+        tree: &Tree,
+        wave: &mut W,
+        i: usize,
+        place: TriangleSlot,
+    ) {
         if place.prim == NO_PRIM {
             return wave.take(i, Hit::MISS);
         }
@@ -54,7 +61,7 @@ impl Settle {
 
     /// Answers those that wait.
     #[inline(always)]
-    pub(super) fn finish<S: Simd, W: Wave>(&mut self, s: S, wave: &mut W) {
+    pub(super) fn finish<S: Simd, W: QueryBatch>(&mut self, s: S, wave: &mut W) {
         let count = std::mem::replace(&mut self.count, 0);
         if count == 0 {
             return;
@@ -74,7 +81,7 @@ impl Settle {
     /// The hit of one ray by the scalar form.
     #[cold]
     #[inline(never)]
-    fn exactly<W: Wave>(&self, wave: &W, lane: usize) -> Hit {
+    fn exactly<W: QueryBatch>(&self, wave: &W, lane: usize) -> Hit {
         let (ray, corners) = (wave.ray(self.rays[lane]), corners_of(&self.pairs.corners, lane));
         let (t, u, v) = triangle::place(&RaySpace::checked(ray.origin, ray.dir).0, &corners);
         Hit { t, u, v, prim: self.prims[lane] }

@@ -2,10 +2,10 @@
 
 use std::marker::PhantomData;
 
-use super::hull::Hull;
+use super::interval_ray::IntervalRay;
 use super::node::{Block, Node, Tree};
 use super::padded::Padding;
-use super::ready::Columns;
+use super::prepared::Columns;
 use super::slabs::{BoxMargins, backwards};
 use crate::accel::{NO_PRIM, Ray};
 use crate::math::Vec3;
@@ -21,7 +21,7 @@ pub(super) const fn all<const N: usize>() -> u32 {
 /// The rays, by axis; as boxes see them by padded slabs (`padded`). Rows lie in whole cache lines: numbers that are read or
 /// written across two take twice as long.
 #[repr(C, align(64))]
-pub(super) struct Bundle<B, const N: usize> {
+pub(super) struct PacketRays<B, const N: usize> {
     pub origin: [[f32; N]; 3],
     pub dir: [[f32; N]; 3],
     inverse: [[f32; N]; 3],
@@ -34,7 +34,7 @@ pub(super) struct Bundle<B, const N: usize> {
     from: [f32; N],
     pub exclude: [u32; N],
     /// All rays as one.
-    hull: Hull,
+    interval: IntervalRay,
     /// Bit k is set where the rays run backwards along axis k.
     pub octant: usize,
     /// Axis of the largest component of every direction.
@@ -47,7 +47,7 @@ pub(super) struct Bundle<B, const N: usize> {
     margins: PhantomData<B>,
 }
 
-impl<B: BoxMargins, const N: usize> Bundle<B, N> {
+impl<B: BoxMargins, const N: usize> PacketRays<B, N> {
     pub(super) fn empty() -> Self {
         let none = [0.0; N];
         Self {
@@ -59,7 +59,7 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
             t_min: none,
             from: none,
             exclude: [NO_PRIM; N],
-            hull: Hull::default(),
+            interval: IntervalRay::default(),
             octant: 0,
             z: 0,
             common: None,
@@ -176,7 +176,7 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
             s.least_of_each([s.sub(zero, inverse[0]), s.sub(zero, inverse[1]), s.sub(zero, inverse[2]), zero]);
         let greatest = [-x, -y, -z];
         let origins = [self.low, self.high];
-        self.hull = Hull::new::<B>(tree, self.octant, [least.into(), greatest.into()], origins, from);
+        self.interval = IntervalRay::new::<B>(tree, self.octant, [least.into(), greatest.into()], origins, from);
     }
 
     /// Finds what bounds all origins.
@@ -203,7 +203,7 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
     #[inline(always)]
     pub(super) fn row_bounds(&self) -> RowBounds {
         // A reciprocal is rounded once.
-        let slowest = self.hull.fastest(self.z);
+        let slowest = self.interval.fastest(self.z);
         RowBounds {
             low: self.low.as_dvec3(),
             high: self.high.as_dvec3(),
@@ -215,7 +215,7 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
     /// Which of eight boxes any ray may meet up to `limit`, and the least distances of that; planes in the order of a node's.
     #[inline(always)]
     pub(super) fn meets_any<S: Simd>(&self, s: S, planes: &[Row; 6], limit: f32) -> (S::Lanes, u32) {
-        self.hull.meets(s, planes, self.octant, limit)
+        self.interval.meets(s, planes, self.octant, limit)
     }
 
     /// Whose triangles' own boxes any ray may meet, of a block.
@@ -229,7 +229,7 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
             let (low, high) = (s.smaller(a, s.smaller(b, c)), s.greater(a, s.greater(b, c)));
             (first[k], last[k]) = if self.octant >> k & 1 == 1 { (high, low) } else { (low, high) };
         }
-        self.hull.between(s, first, last, limit).1
+        self.interval.between(s, first, last, limit).1
     }
 
     /// Which rays meet the box of a child up to their limits.

@@ -14,35 +14,35 @@ const PLACES: usize = 16;
 const NONE: u32 = u32::MAX;
 
 /// From where blocks are seen: the origin, the main axis and the octant.
-type Seat = (Vec3, usize, usize);
+type CacheKey = (Vec3, usize, usize);
 
 /// Blocks that were visited lately.
 #[derive(Clone, Debug)]
-pub(super) struct Shelf {
-    seat: Seat,
+pub(super) struct BlockCache {
+    seat: CacheKey,
     /// Which block is in a place.
     blocks: [u32; PLACES],
-    kept: Box<[Kept; PLACES]>,
+    kept: Box<[CachedBlock; PLACES]>,
 }
 
 /// A block.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct Kept {
+pub(super) struct CachedBlock {
     /// The boxes of its triangles: planes in the order of a node's.
     pub planes: [Row; 6],
     /// What a fan sees of them.
     pub ready: FanReady,
 }
 
-impl Default for Shelf {
+impl Default for BlockCache {
     fn default() -> Self {
-        let kept = Kept { planes: [[0.0; LANES]; 6], ready: FanReady::EMPTY };
+        let kept = CachedBlock { planes: [[0.0; LANES]; 6], ready: FanReady::EMPTY };
         Self { seat: (Vec3::ZERO, 0, 0), blocks: [NONE; PLACES], kept: Box::new([kept; PLACES]) }
     }
 }
 
-impl Shelf {
+impl BlockCache {
     /// Forgets all blocks.
     #[inline(always)]
     pub(super) fn clear(&mut self) {
@@ -51,7 +51,7 @@ impl Shelf {
 
     /// From now on blocks are seen from here; those that were seen from elsewhere are forgotten.
     #[inline(always)]
-    pub(super) fn sit(&mut self, seat: Seat) {
+    pub(super) fn sit(&mut self, seat: CacheKey) {
         if self.seat != seat {
             self.seat = seat;
             self.clear();
@@ -83,7 +83,7 @@ impl Shelf {
 
     /// What is in a place.
     #[inline(always)]
-    pub(super) fn at(&self, place: usize) -> &Kept {
+    pub(super) fn at(&self, place: usize) -> &CachedBlock {
         &self.kept[place % PLACES]
     }
 }

@@ -3,7 +3,7 @@
 use super::node::Tree;
 use super::padded::{PaddedSlabs, Padding};
 use super::slabs::BoxMargins;
-use crate::accel::wave::{Pencil, Wave};
+use crate::accel::query_batch::{Pencil, QueryBatch};
 use crate::accel::{NO_PRIM, Ray};
 use crate::math::Vec3;
 use crate::math::sight::Sight;
@@ -13,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 /// A ray as boxes and blocks see it: rows of four numbers, which lanes write at once.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct ReadyRay {
+pub(super) struct PreparedRay {
     pub slabs: PaddedSlabs,
     pub sight: Sight,
     /// Hits count up to here.
@@ -21,8 +21,8 @@ pub(super) struct ReadyRay {
 }
 
 /// Eight rays.
-pub(super) struct Ready {
-    pub rays: [ReadyRay; LANES],
+pub(super) struct PreparedRays {
+    pub rays: [PreparedRay; LANES],
     /// Their hits count from here.
     pub t_min: Row,
     /// What they do not hit.
@@ -31,16 +31,16 @@ pub(super) struct Ready {
     pub allowed: u32,
 }
 
-impl Default for Ready {
+impl Default for PreparedRays {
     fn default() -> Self {
-        Self { rays: [ReadyRay::zeroed(); LANES], t_min: [0.0; LANES], exclude: [NO_PRIM; LANES], allowed: 0 }
+        Self { rays: [PreparedRay::zeroed(); LANES], t_min: [0.0; LANES], exclude: [NO_PRIM; LANES], allowed: 0 }
     }
 }
 
-impl Ready {
+impl PreparedRays {
     /// Takes the rays of a wave from `start` on, of which there is one at least.
     #[inline(always)]
-    pub(super) fn take<B: BoxMargins, S: Simd, W: Wave>(&mut self, s: S, tree: &Tree, wave: &W, start: usize) {
+    pub(super) fn take<B: BoxMargins, S: Simd, W: QueryBatch>(&mut self, s: S, tree: &Tree, wave: &W, start: usize) {
         let rays = &wave.rays()[start..];
         let Columns { origin: o, dir: d, t_min, t_max } = match wave.pencil() {
             Some(pencil) if rays.len() >= LANES => Columns::of_pencil(s, &pencil, start),
@@ -147,8 +147,8 @@ mod tests {
     use super::*;
     use crate::accel::Hit;
     use crate::accel::intersector::Exact;
+    use crate::accel::query_batch::{ClosestBatch, NextBatch};
     use crate::accel::tests::scenes::{broken_rays, ray};
-    use crate::accel::wave::{ForFirst, ForNext};
     use crate::math::Vec3;
     use crate::math::aabb::Aabb;
     use crate::math::bounds::{BOX_PAD, BOX_RANGE, PARALLEL};
@@ -164,23 +164,23 @@ mod tests {
 
     struct Take<'a, W>(&'a Tree<'a>, &'a W, usize);
 
-    impl<W: Wave> Kernel for Take<'_, W> {
-        type Output = Ready;
+    impl<W: QueryBatch> Kernel for Take<'_, W> {
+        type Output = PreparedRays;
 
         #[inline(always)]
-        fn run<S: Simd>(self, s: S) -> Ready {
-            let mut ready = Ready::default();
+        fn run<S: Simd>(self, s: S) -> PreparedRays {
+            let mut ready = PreparedRays::default();
             ready.take::<Derived, _, _>(s, self.0, self.1, self.2);
             ready
         }
     }
 
-    fn take(level: Level, tree: &Tree, rays: &[Ray], start: usize) -> Ready {
-        level.run(Take(tree, &ForFirst { rays, pencil: None, gaps: None, hits: &mut [], test: Exact }, start))
+    fn take(level: Level, tree: &Tree, rays: &[Ray], start: usize) -> PreparedRays {
+        level.run(Take(tree, &ClosestBatch { rays, pencil: None, filter: None, hits: &mut [], test: Exact }, start))
     }
 
     /// The same by plain numbers, one ray after another.
-    fn plainly(tree: &Tree, ray: &Ray) -> (ReadyRay, f32) {
+    fn plainly(tree: &Tree, ray: &Ray) -> (PreparedRay, f32) {
         let (space, _) = RaySpace::checked(ray.origin, ray.dir);
         let parallel = ray.dir.abs().max_element() * PARALLEL;
         let inverse = [0, 1, 2].map(|k| 1.0 / ray.dir[k].abs().max(parallel).copysign(ray.dir[k]));
@@ -189,7 +189,7 @@ mod tests {
         let pad = |k: usize| ((tree.extent + far[k]) * BOX_PAD + drift) * inverse[k].abs();
         let octant = (0..3).fold(0, |octant, k| octant | u32::from(ray.dir[k].is_sign_negative()) << k);
         let t_max = ray.t_max.min(f32::MAX);
-        let ready = ReadyRay {
+        let ready = PreparedRay {
             slabs: PaddedSlabs {
                 inverse,
                 from: Derived::started(ray.t_min).max(0.0),
@@ -210,7 +210,7 @@ mod tests {
     }
 
     /// The same of a ray that was taken.
-    fn of(ready: &Ready, lane: usize) -> (ReadyRay, f32) {
+    fn of(ready: &PreparedRays, lane: usize) -> (PreparedRay, f32) {
         (ready.rays[lane], ready.t_min[lane])
     }
 
@@ -263,7 +263,7 @@ mod tests {
         let after: Vec<Hit> = (0..rays.len()).map(|i| Hit { t: i as f32 * 0.25, ..Hit::MISS }).collect();
         for level in Level::all() {
             let mut hits = vec![Hit::MISS; rays.len()];
-            let wave = ForNext { rays, after: &after, gaps: None, hits: &mut hits, test: Exact };
+            let wave = NextBatch { rays, after: &after, filter: None, hits: &mut hits, test: Exact };
             for start in [0, LANES] {
                 let ready = level.run(Take(&tree, &wave, start));
                 for (i, lane) in (start..rays.len()).zip(0..LANES) {
