@@ -309,7 +309,7 @@ fn punch(scene: &mut Scene) {
     scene.materials.iter_mut().for_each(|material| material.alpha_mode = AlphaMode::Mask { cutoff: 0.4 });
 }
 
-/// Covers all materials with fibres and lacquer, and maps of both.
+/// Covers all materials with fibres and clear coat, and maps of both.
 fn cover(scene: &mut Scene) {
     for material in &mut scene.materials {
         let map = material.base_color_map;

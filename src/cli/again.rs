@@ -8,13 +8,13 @@ use super::archives;
 use super::args::{Cli, Command, LoadArgs, RenderArgs};
 use super::camera::{Choice, LensChoice};
 use super::exit::Exit;
-use super::fresh;
 use super::job::{Batch, Look, RenderJob, Shot};
 use super::parse::{self, Env};
 use super::picture::Effective;
 use super::sampling;
 use super::sequence::Sequence;
 use super::stats::Counted;
+use super::up_to_date;
 use crate::accel::auto::Reason;
 use crate::accel::{AccelKind, Assign, MailboxKind};
 use crate::image::{ExrSamples, FileKind, ImageError, Metadata, PngDepth, read_metadata};
@@ -293,7 +293,7 @@ pub(super) fn metadata(making: &Making, counted: Option<&Counted>) -> Metadata {
     let made_of = match &making.job.again {
         // As that of the picture that is repeated.
         Some(_) => making.job.made_of.clone(),
-        None if making.job.update => fresh::made_of(making.job, making.batch, making.shot, making.loaded),
+        None if making.job.update => up_to_date::made_of(making.job, making.batch, making.shot, making.loaded),
         None => None,
     };
     let metadata = made_of.into_iter().fold(metadata, |metadata, text| metadata.with(Metadata::MADE_OF, text));

@@ -1,7 +1,7 @@
 //! From what the user chose to a camera in the scene.
 
 use super::args::EyeArgs;
-use super::job::{Wrong, wrong};
+use super::job::{UsageError, wrong};
 use super::parse::Ortho;
 use crate::load::Diagnostic;
 use crate::load::choice::{Kind, choose};
@@ -32,7 +32,7 @@ pub(super) enum Choice {
 
 impl Choice {
     /// What was typed for a single picture; `up` belongs to the place of an eye.
-    pub(super) fn of(args: &EyeArgs, up: Option<[f64; 3]>) -> Result<Self, Wrong> {
+    pub(super) fn of(args: &EyeArgs, up: Option<[f64; 3]>) -> Result<Self, UsageError> {
         if let Some(eye) = args.eye {
             check_eye(args.eye, args.at)?;
             return Ok(Self::Free { eye: eye.into(), at: args.at.map(Into::into), up: up.map(Into::into) });
@@ -184,7 +184,7 @@ impl Shown<'_> {
 }
 
 /// Refuses an eye that looks at itself.
-pub(super) fn check_eye(eye: Option<[f64; 3]>, at: Option<[f64; 3]>) -> Result<(), Wrong> {
+pub(super) fn check_eye(eye: Option<[f64; 3]>, at: Option<[f64; 3]>) -> Result<(), UsageError> {
     if eye.is_some() && eye == at {
         return wrong("--eye and --at are one point, so the camera looks nowhere; move one");
     }

@@ -11,8 +11,8 @@ use super::args::ExplainArgs;
 use super::exit::Exit;
 use super::job;
 use super::message::Messages;
-use super::seen::{self, Seen};
-use super::{accident, interrupt};
+use super::viewed::{self, ViewedModel};
+use super::{interrupt, panics};
 use crate::accel::{AccelParams, auto};
 use crate::bench::explain::{Bill, Case, Finding, WORTH, Work, explain};
 use crate::number::{grouped, hash, short};
@@ -28,7 +28,7 @@ pub(super) fn run(args: &ExplainArgs) -> Exit {
         Err(wrong) => return messages.wrong(wrong),
     };
     let name = args.model.input.display().to_string();
-    accident::guard(&name, &messages, || judge(args, params, &name, &messages).unwrap_or_else(|exit| exit))
+    panics::guard(&name, &messages, || judge(args, params, &name, &messages).unwrap_or_else(|exit| exit))
 }
 
 /// What is printed.
@@ -43,8 +43,8 @@ struct Told<'a> {
 }
 
 fn judge(args: &ExplainArgs, params: AccelParams, name: &str, messages: &Messages) -> Result<Exit, Exit> {
-    let Seen { loaded, world, view, phrase } = seen::model(&args.model, &args.eye, args.size, messages)?;
-    let settings = Settings { samples: 1, ..seen::settings(args.size, args.depth, &loaded.scene.hints) };
+    let ViewedModel { loaded, world, view, phrase } = viewed::model(&args.model, &args.eye, args.size, messages)?;
+    let settings = Settings { samples: 1, ..viewed::settings(args.size, args.depth, &loaded.scene.hints) };
     let (accel, _) = auto::build(args.accel, &world.shapes, &params);
     let kind = accel.kind();
     let case = Case { scene: loaded.scene, view, settings, accel: kind, params };

@@ -19,11 +19,11 @@ use std::path::{Path, PathBuf};
 
 /// A command line that cannot be carried out: one line, exit code 2.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Wrong(pub String);
+pub(super) struct UsageError(pub String);
 
 /// The error of such a command line.
-pub(super) fn wrong<T>(text: impl Into<String>) -> Result<T, Wrong> {
-    Err(Wrong(text.into()))
+pub(super) fn wrong<T>(text: impl Into<String>) -> Result<T, UsageError> {
+    Err(UsageError(text.into()))
 }
 
 /// Everything `meshray render` is to do.
@@ -48,7 +48,7 @@ pub(super) struct RenderJob {
     /// 0: all.
     pub threads: usize,
     /// Whether what the scene does without is done all the same.
-    pub everything: bool,
+    pub no_prune: bool,
     /// Heat maps beside each picture.
     pub heatmaps: Vec<Cost>,
     /// What their brightest colour stands for; `None`: the most of any pixel.
@@ -157,7 +157,7 @@ pub(super) struct Stats {
 
 impl RenderJob {
     /// Checks what was typed. Touches no file.
-    pub(super) fn new(args: &RenderArgs) -> Result<Self, Wrong> {
+    pub(super) fn new(args: &RenderArgs) -> Result<Self, UsageError> {
         check_flags(args)?;
         args.sampling.check()?;
         if args.again.is_none() {
@@ -182,7 +182,7 @@ impl RenderJob {
             intersector: args.intersector,
             instances: instances(args)?,
             threads: usize::from(args.threads),
-            everything: args.no_prune,
+            no_prune: args.no_prune,
             heatmaps: args.heatmap.clone(),
             heatmap_max: args.heatmap_max,
             stats,
@@ -222,7 +222,7 @@ pub(super) fn keeps_instances(choice: AccelChoice) -> bool {
 }
 
 /// What the structure and the test can do of what was asked.
-fn instances(args: &RenderArgs) -> Result<Instancing, Wrong> {
+fn instances(args: &RenderArgs) -> Result<Instancing, UsageError> {
     let able = keeps_instances(args.accel);
     let exact = args.intersector == IntersectorKind::Exact;
     match args.instances {
@@ -240,12 +240,12 @@ fn instances(args: &RenderArgs) -> Result<Instancing, Wrong> {
 }
 
 /// Refuses to read standard input twice.
-pub(super) fn check_stdin(inputs: &[PathBuf]) -> Result<(), Wrong> {
+pub(super) fn check_stdin(inputs: &[PathBuf]) -> Result<(), UsageError> {
     let times = inputs.iter().filter(|input| input.as_path() == Path::new("-")).count();
     if times > 1 { wrong("standard input (`-`) can be read only once") } else { Ok(()) }
 }
 
-fn check_flags(args: &RenderArgs) -> Result<(), Wrong> {
+fn check_flags(args: &RenderArgs) -> Result<(), UsageError> {
     check_stdin(&args.inputs)?;
     if args.inputs.is_empty() {
         return wrong("no input; name a model");
@@ -279,7 +279,7 @@ fn check_flags(args: &RenderArgs) -> Result<(), Wrong> {
 }
 
 /// Every view that was asked for; one default when none was.
-fn choices(args: &RenderArgs) -> Result<Vec<Choice>, Wrong> {
+fn choices(args: &RenderArgs) -> Result<Vec<Choice>, UsageError> {
     if let Some(eye) = args.eye {
         let (at, up) = (args.at.map(Into::into), args.up_vector.map(Into::into));
         return Ok(vec![Choice::Free { eye: eye.into(), at, up }]);
@@ -292,7 +292,7 @@ fn choices(args: &RenderArgs) -> Result<Vec<Choice>, Wrong> {
     Ok(choices)
 }
 
-fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -> Result<Vec<Batch>, Wrong> {
+fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -> Result<Vec<Batch>, UsageError> {
     let steps = sequence::steps(args, sequence)?;
     let groups: Vec<Vec<PathBuf>> =
         if args.merge { vec![args.inputs.clone()] } else { args.inputs.iter().map(|i| vec![i.clone()]).collect() };
@@ -329,10 +329,10 @@ fn beside(args: &RenderArgs) -> Beside<'_> {
 }
 
 /// Sizes that a type of file cannot hold, and flags that only one type can honour.
-fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), Wrong> {
+fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), UsageError> {
     if let Some((width, height)) = args.size {
         for shot in batches.iter().flat_map(|b| &b.shots) {
-            shot.kind.fits(width, height).map_err(|e| Wrong(e.to_string()))?;
+            shot.kind.fits(width, height).map_err(|e| UsageError(e.to_string()))?;
         }
     }
     let all = |kind| batches.iter().flat_map(|b| &b.shots).all(|s| s.kind == kind);
@@ -381,8 +381,8 @@ fn look(args: &RenderArgs) -> Look {
 }
 
 /// The parameters of the structures that may be built, checked.
-pub(super) fn params(args: &AccelArgs, kinds: &[AccelKind]) -> Result<AccelParams, Wrong> {
-    args.check_use(kinds).map_err(Wrong)?;
+pub(super) fn params(args: &AccelArgs, kinds: &[AccelKind]) -> Result<AccelParams, UsageError> {
+    args.check_use(kinds).map_err(UsageError)?;
     let params = AccelParams {
         density: args.grid_density,
         max_resolution: args.grid_resolution,
@@ -395,7 +395,7 @@ pub(super) fn params(args: &AccelArgs, kinds: &[AccelKind]) -> Result<AccelParam
         thickness: 0.0,
         mailbox: args.mailbox,
     };
-    params.validate().map_err(|e| Wrong(e.to_string()))?;
+    params.validate().map_err(|e| UsageError(e.to_string()))?;
     Ok(params)
 }
 
@@ -432,7 +432,7 @@ mod tests {
     use crate::cli::args::{Cli, Command};
     use clap::Parser;
 
-    fn job(line: &str) -> Result<RenderJob, Wrong> {
+    fn job(line: &str) -> Result<RenderJob, UsageError> {
         let words = ["meshray", "render"].into_iter().chain(line.split(' '));
         match Cli::try_parse_from(words).unwrap().command {
             Command::Render(args) => RenderJob::new(&args),
@@ -476,7 +476,7 @@ mod tests {
     #[test]
     fn what_makes_colours_for_a_display_is_refused_where_all_pictures_keep_the_light() {
         for flag in ["--exposure 1", "--tone-map aces"] {
-            let Wrong(text) = job(&format!("a.glb -o a.exr {flag}")).unwrap_err();
+            let UsageError(text) = job(&format!("a.glb -o a.exr {flag}")).unwrap_err();
             assert!(text.contains("EXR keeps the light"), "{flag}: {text}");
             assert!(job(&format!("a.glb -o a.png {flag}")).is_ok());
         }
@@ -487,7 +487,7 @@ mod tests {
     #[test]
     fn two_pictures_of_one_name_are_refused_before_any_work() {
         for line in ["x/a.obj y/a.glb", "a.obj b.obj -o c.png", "a.obj --view front,back -o a.png", "a.obj ./a.obj"] {
-            let Wrong(text) = job(line).unwrap_err();
+            let UsageError(text) = job(line).unwrap_err();
             assert!(text.contains("would both be written to"), "{line}: {text}");
         }
         assert!(job("x/a.obj y/a.glb -o {frame:04}.png").is_ok());

@@ -4,7 +4,7 @@
 //! `error`, `warning` or `info`, codes are stable. stdout holds only what was asked for, never a message.
 
 use super::exit::Exit;
-use super::job::Wrong;
+use super::job::UsageError;
 use crate::load::suggest::nearest;
 use crate::load::{Diagnostic, LoadError};
 use indicatif::MultiProgress;
@@ -174,7 +174,7 @@ impl Messages {
     }
 
     /// Writes what is wrong with the command line.
-    pub(super) fn wrong(&self, Wrong(text): Wrong) -> Exit {
+    pub(super) fn wrong(&self, UsageError(text): UsageError) -> Exit {
         self.error("usage", text, "");
         Exit::Usage
     }

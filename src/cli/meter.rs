@@ -133,8 +133,8 @@ mod tests {
         let settings = &Settings::default();
         let job = Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view: &view, settings };
         let usual = exposure(&job);
-        let (world, textures) = (world.clone().with_everything(), TextureStore::new(&scene).with_everything());
-        let settings = &Settings { everything: true, ..Settings::default() };
+        let (world, textures) = (world.clone().without_pruning(), TextureStore::new(&scene).without_pruning());
+        let settings = &Settings { no_prune: true, ..Settings::default() };
         assert_eq!(exposure(&Job { world: &world, textures: &textures, settings, ..job }), usual);
         usual
     }

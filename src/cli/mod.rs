@@ -3,7 +3,6 @@
 //! `args` is what was typed, `job` what that means once everything is checked; one file per command does the work.
 //! Only this module prints. stdout carries only what was asked for, everything else goes to stderr.
 
-mod accident;
 mod again;
 mod archives;
 mod args;
@@ -12,21 +11,22 @@ mod camera;
 mod cost_layers;
 mod diff;
 mod dry_run;
+mod empty_picture;
 mod exit;
 mod explain;
 mod folders;
-mod fresh;
 mod generate;
 mod inspect;
 mod interrupt;
 mod job;
-mod lanes;
 mod memory;
 mod message;
 mod meter;
 mod moment;
 mod output_name;
 mod outputs;
+mod panics;
+mod parallel_inputs;
 mod parse;
 mod picture;
 mod profile;
@@ -34,7 +34,6 @@ mod progress;
 mod read;
 mod render;
 mod sampling;
-mod seen;
 mod sequence;
 mod shell;
 mod shot;
@@ -43,9 +42,10 @@ mod study;
 mod summary;
 mod surroundings;
 mod trace;
-mod unseen;
+mod up_to_date;
 mod verify;
 mod version;
+mod viewed;
 mod writable;
 
 pub use exit::Exit;
@@ -69,13 +69,13 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
         && let Err(chosen) = level.choose()
     {
         let text = format!("--simd {}: this process has begun with {}", level.word(), chosen.word());
-        return Messages::new(format, false).wrong(job::Wrong(text));
+        return Messages::new(format, false).wrong(job::UsageError(text));
     }
     interrupt::install(format);
-    accident::install();
+    panics::install();
     memory::keep_freed();
     // What goes wrong outside of a model's own guard is said, too.
-    accident::guard("meshray", &Messages::new(format, false), || carry_out(command))
+    panics::guard("meshray", &Messages::new(format, false), || carry_out(command))
 }
 
 fn carry_out(command: Command) -> Exit {

@@ -1,16 +1,16 @@
 //! Which moment of an animation was asked for.
 
 use super::args::MomentArgs;
-use super::job::Wrong;
+use super::job::UsageError;
 use crate::load::Moment;
 
 /// Frames a second where nobody says.
 const FPS: f64 = 24.0;
 
 /// What was typed; `None`: the rest pose.
-pub(super) fn moment(args: &MomentArgs) -> Result<Option<Moment>, Wrong> {
+pub(super) fn moment(args: &MomentArgs) -> Result<Option<Moment>, UsageError> {
     if args.fps.is_some() && args.frame.is_none() {
-        return Err(Wrong("--fps says how long a frame is; add --frame N".into()));
+        return Err(UsageError("--fps says how long a frame is; add --frame N".into()));
     }
     let time = args.time.or_else(|| Some(f64::from(args.frame?) / fps(args)));
     let any = time.is_some() || args.animation.is_some();

@@ -2,7 +2,7 @@
 
 use super::args::RenderArgs;
 use super::camera::Choice;
-use super::job::{Batch, Shot, Stats, Wrong, wrong};
+use super::job::{Batch, Shot, Stats, UsageError, wrong};
 use super::output_name::{self, Fields, Naming};
 use crate::image::FileKind;
 use crate::load::Diagnostic;
@@ -52,7 +52,11 @@ pub(super) fn folder_of(file: &Path) -> PathBuf {
 pub(super) type Growth = Option<PathBuf>;
 
 /// Where the next picture goes, and as what.
-pub(super) fn target(args: &RenderArgs, fields: &Fields, naming: Naming) -> Result<(Target, FileKind, Growth), Wrong> {
+pub(super) fn target(
+    args: &RenderArgs,
+    fields: &Fields,
+    naming: Naming,
+) -> Result<(Target, FileKind, Growth), UsageError> {
     let format = args.format.map(FileKind::from);
     let usual = |folder| output_name::default_template(folder, naming, format.unwrap_or(FileKind::Png).extension());
     let (template, kept): (String, fn(PathBuf) -> Target) = match args.output.as_deref() {
@@ -64,13 +68,13 @@ pub(super) fn target(args: &RenderArgs, fields: &Fields, naming: Naming) -> Resu
         Some(template) => (template.to_owned(), Target::Named),
         None => (name_again(args).unwrap_or_else(|| usual(None)), Target::Default),
     };
-    let path = output_name::fill(&template, fields).map_err(Wrong)?;
+    let path = output_name::fill(&template, fields).map_err(UsageError)?;
     // What leads out of it again is not made.
     let holds = |base: &PathBuf| {
         let (base, path) = (lexical(base), lexical(&path));
         path.strip_prefix(&base).is_ok_and(|way| way.components().all(|part| matches!(part, Component::Normal(_))))
     };
-    let growth = output_name::grows_in(&template, fields).map_err(Wrong)?.filter(holds);
+    let growth = output_name::grows_in(&template, fields).map_err(UsageError)?.filter(holds);
     let kind = match (format, FileKind::from_path(&path)) {
         (Some(typed), Ok(named)) if typed != named => {
             let (path, format) = (path.display(), typed.extension());
@@ -147,7 +151,7 @@ pub(super) fn make_folder(shot: &Shot) -> Result<(), Diagnostic> {
 }
 
 /// Refuses two pictures of one name.
-pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
+pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), UsageError> {
     let shots: Vec<(&Path, &Shot)> =
         batches.iter().flat_map(|b| b.shots.iter().map(|s| (b.inputs[0].as_path(), s))).collect();
     let to_stdout = shots.iter().filter(|(_, s)| s.target == Target::Stdout).count();
@@ -180,7 +184,7 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
 }
 
 /// What is beside a picture is named after it, and must not fall on another.
-pub(super) fn check_beside(batches: &[Batch], beside: Beside) -> Result<(), Wrong> {
+pub(super) fn check_beside(batches: &[Batch], beside: Beside) -> Result<(), UsageError> {
     let shots = || batches.iter().flat_map(|b| &b.shots);
     let heatmaps = beside.heatmaps;
     if let Some(twice) = heatmaps.iter().enumerate().find(|(i, cost)| heatmaps[..*i].contains(cost)) {
@@ -205,7 +209,7 @@ pub(super) fn check_beside(batches: &[Batch], beside: Beside) -> Result<(), Wron
 }
 
 /// Statistics must not fall on a picture or what is beside it.
-pub(super) fn check_stats_file(stats: Option<&Stats>, batches: &[Batch], beside: Beside) -> Result<(), Wrong> {
+pub(super) fn check_stats_file(stats: Option<&Stats>, batches: &[Batch], beside: Beside) -> Result<(), UsageError> {
     let Some(file) = stats.and_then(|stats| stats.file.as_deref()) else { return Ok(()) };
     let names = files(batches.iter().flat_map(|b| &b.shots), beside);
     let target = output_name::identity(file);

@@ -44,7 +44,7 @@ impl Effective {
                 walls: usual.walls,
                 layers: look.layers,
                 one_by_one: false,
-                everything: false,
+                no_prune: false,
             },
             output: Output {
                 tone_map: tone_map(look.tone_map, scene)?,
@@ -94,8 +94,8 @@ impl Effective {
     }
 
     /// With or without the work that the scene does not need.
-    pub(super) fn with_everything(mut self, everything: bool) -> Self {
-        self.settings.everything = everything;
+    pub(super) fn without_pruning(mut self, no_prune: bool) -> Self {
+        self.settings.no_prune = no_prune;
         self
     }
 }

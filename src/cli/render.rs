@@ -12,7 +12,7 @@ use super::sequence::{Step, Survey};
 use super::shot::{self, Stage, Task};
 use super::stats::{self, PictureStats};
 use super::writable::{self, Sources};
-use super::{again, fresh, interrupt, lanes, read, surroundings, unseen};
+use super::{again, empty_picture, interrupt, parallel_inputs, read, surroundings, up_to_date};
 use crate::image::destination;
 use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::number::so_many;
@@ -46,7 +46,7 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
             return messages.fail(&fault, Exit::Failed);
         }
     }
-    let lanes::Ended { worst, failed } = lanes::run(job, &pool, messages, &mut so_far);
+    let parallel_inputs::Ended { worst, failed } = parallel_inputs::run(job, &pool, messages, &mut so_far);
     if interrupt::raised() {
         return Exit::Interrupted;
     }
@@ -188,7 +188,7 @@ pub(super) fn render_batch(
 ) -> Exit {
     let mut old = shots.to_vec();
     if job.update {
-        old.retain(|shot| match fresh::up_to_date(job, batch, shot) {
+        old.retain(|shot| match up_to_date::up_to_date(job, batch, shot) {
             None => true,
             Some(files) => {
                 // Other pictures must not replace them, either.
@@ -233,7 +233,7 @@ fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit
         }
         let mut stage = ready.stage(survey.as_ref());
         for shot in now {
-            if job.update && fresh::is_as_loaded(job, batch, shot, stage.loaded) {
+            if job.update && up_to_date::is_as_loaded(job, batch, shot, stage.loaded) {
                 so_far.up_to_date += 1;
                 continue;
             }
@@ -247,7 +247,7 @@ fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit
     }
     let all = shots.len() == batch.shots.len() && so_far.up_to_date == up_to_date;
     if survey.is_some() && all && !so_far.shown && !job.dry_run && worst == Exit::Done {
-        messages.say(Severity::Warning, &unseen::sequence(shots.len(), task.file()));
+        messages.say(Severity::Warning, &empty_picture::sequence(shots.len(), task.file()));
         if job.strict {
             let text = "--strict, and there is a warning; the pictures were written before it was known";
             return Ok(task.fail(&Diagnostic::new("strict", task.file(), "", text), Exit::Input));
@@ -368,7 +368,7 @@ fn prepare(
     }
     let world = read::as_drawn(&loaded, job.instances, job.load.limits.memory, &batch.inputs[0])
         .map_err(|fault| task.fail(&fault, Exit::Failed))?;
-    let world = if job.everything { world.with_everything() } else { world };
+    let world = if job.no_prune { world.without_pruning() } else { world };
     if world.is_empty() && !job.allow_empty && survey.is_none() {
         return Err(task.fail(&nothing_to_draw(&loaded, &batch.inputs[0]), Exit::Input));
     }

@@ -1,7 +1,7 @@
 //! The flags of pixel sampling and of the lens: what was typed, what it means together, and how it is stored in a picture.
 
 use super::args::SpaceArg;
-use super::job::Wrong;
+use super::job::UsageError;
 use super::parse::{self, Focus};
 use crate::image::{FileKind, Output};
 use crate::load::Diagnostic;
@@ -117,49 +117,49 @@ const NARROW: f64 = 2.0;
 
 impl SamplingArgs {
     /// Refuses flags that belong to different kinds of sampling.
-    pub(super) fn check(&self) -> Result<(), Wrong> {
+    pub(super) fn check(&self) -> Result<(), UsageError> {
         let (stochastic, adaptive) = (self.stochastic_flags(), self.adaptive_flags());
         let uniform = [("--samples", self.samples.is_some())];
         let groups = [(Aa::Stochastic, &stochastic[..]), (Aa::Adaptive, &adaptive), (Aa::Uniform, &uniform)];
         let asked = |flags: &[(&'static str, bool)]| flags.iter().find(|(_, typed)| *typed).map(|(flag, _)| *flag);
         let mut typed = groups.iter().filter_map(|(aa, flags)| asked(flags).map(|flag| (*aa, flag)));
         if let (Some((_, one)), Some((_, other))) = (typed.next(), typed.next()) {
-            return Err(Wrong(format!("{one} and {other} belong to different kinds of --aa; use one of them")));
+            return Err(UsageError(format!("{one} and {other} belong to different kinds of --aa; use one of them")));
         }
         for (aa, flags) in groups {
             if let (Some(chosen), Some(flag)) = (self.aa, asked(flags))
                 && chosen != aa
             {
                 let name = |aa: Aa| aa.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned());
-                return Err(Wrong(format!("{flag} belongs to --aa {}, not to --aa {}", name(aa), name(chosen))));
+                return Err(UsageError(format!("{flag} belongs to --aa {}, not to --aa {}", name(aa), name(chosen))));
             }
         }
         if self.error_space.is_some() && (self.samples.is_some() || matches!(self.aa, Some(Aa::Off | Aa::Uniform))) {
             let text = "--error-space belongs to --aa stochastic and adaptive: --aa uniform looks at no error";
-            return Err(Wrong(text.into()));
+            return Err(UsageError(text.into()));
         }
         if let (Some(least), Some(most)) = (self.aa_min_depth, self.aa_depth)
             && least > most
         {
-            return Err(Wrong(format!("--aa-min-depth {least} is more than --aa-depth {most}")));
+            return Err(UsageError(format!("--aa-min-depth {least} is more than --aa-depth {most}")));
         }
         if let (Some(fewest), Some(most)) = (self.min_samples, self.max_samples)
             && fewest > most
         {
-            return Err(Wrong(format!("--min-samples {fewest} is more than --max-samples {most}")));
+            return Err(UsageError(format!("--min-samples {fewest} is more than --max-samples {most}")));
         }
         Ok(())
     }
 
     /// Refuses a limit on the samples of a pixel where the error of the picture says how many there are. What a picture carries
     /// to be repeated has both.
-    pub(super) fn check_target(&self) -> Result<(), Wrong> {
+    pub(super) fn check_target(&self) -> Result<(), UsageError> {
         if self.target_error.is_none() || self.max_samples.is_none() {
             return Ok(());
         }
         let text = "--target-error takes as many samples as the picture needs, so --max-samples cannot limit them; leave \
                     one of them out, or use --pixel-error with --max-samples";
-        Err(Wrong(text.into()))
+        Err(UsageError(text.into()))
     }
 
     /// Flags of stochastic sampling alone, and whether they were typed.
@@ -425,10 +425,10 @@ mod tests {
     fn flags_of_different_kinds_are_refused_by_name() {
         let none = SamplingArgs::default();
         let both = SamplingArgs { samples: Some(4), pixel_error: Some(0.01), ..none.clone() };
-        let Wrong(text) = both.check().unwrap_err();
+        let UsageError(text) = both.check().unwrap_err();
         assert!(text.contains("--pixel-error") && text.contains("--samples"), "{text}");
         let other = SamplingArgs { aa: Some(Aa::Adaptive), filter: Some(Filter::Tent), ..none.clone() };
-        let Wrong(text) = other.check().unwrap_err();
+        let UsageError(text) = other.check().unwrap_err();
         assert!(text.contains("--filter") && text.contains("stochastic") && text.contains("adaptive"), "{text}");
         assert!(SamplingArgs { min_samples: Some(8), max_samples: Some(4), ..none }.check().is_err());
     }

@@ -5,7 +5,7 @@
 use super::args::RenderArgs;
 use super::camera::{self, Choice, Shown};
 use super::exit::Exit;
-use super::job::{Batch, RenderJob, Shot, Wrong};
+use super::job::{Batch, RenderJob, Shot, UsageError};
 use super::message::{Messages, Severity};
 use super::parse::{Frames, Turns};
 use super::progress::Progress;
@@ -43,24 +43,24 @@ pub(super) struct Step {
 }
 
 /// The sequence that was typed.
-pub(super) fn of(args: &RenderArgs) -> Result<Option<Sequence>, Wrong> {
+pub(super) fn of(args: &RenderArgs) -> Result<Option<Sequence>, UsageError> {
     let Some(frames) = args.frames else { return Ok(args.turntable.map(Sequence::Turntable)) };
     if let Some(frame) = args.load.moment.frame.filter(|frame| !(frames.first..frames.end).contains(frame)) {
-        return Err(Wrong(format!("--frame {frame} is none of --frames {frames}")));
+        return Err(UsageError(format!("--frame {frame} is none of --frames {frames}")));
     }
     let is_stream = |input: &&PathBuf| {
         *input == Path::new("-") || std::fs::metadata(input).is_ok_and(|file| !file.is_file() && !file.is_dir())
     };
     if let Some(input) = args.inputs.iter().find(is_stream) {
         let name = if input == Path::new("-") { "standard input (`-`)".into() } else { input.display().to_string() };
-        return Err(Wrong(format!("--frames reads the model for each frame, and {name} can be read only once")));
+        return Err(UsageError(format!("--frames reads the model for each frame, and {name} can be read only once")));
     }
     let animation = args.load.moment.animation.clone();
     Ok(Some(Sequence::Frames { frames, fps: moment::fps(&args.load.moment), animation }))
 }
 
 /// The pictures of each view, in order.
-pub(super) fn steps(args: &RenderArgs, sequence: Option<&Sequence>) -> Result<Vec<Step>, Wrong> {
+pub(super) fn steps(args: &RenderArgs, sequence: Option<&Sequence>) -> Result<Vec<Step>, UsageError> {
     Ok(match sequence {
         Some(whole @ Sequence::Frames { frames, .. }) => {
             let wanted = args.load.moment.frame.map_or(frames.first..frames.end, |only| only..only + 1);

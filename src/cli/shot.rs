@@ -12,7 +12,7 @@ use super::render::SoFar;
 use super::sequence::{self, Survey};
 use super::stats::{self, Counted, PictureStats, Times};
 use super::summary::Summary;
-use super::{again, cost_layers, dry_run, interrupt, read, surroundings, unseen};
+use super::{again, cost_layers, dry_run, empty_picture, interrupt, read, surroundings};
 use crate::accel::AnyAccel;
 use crate::accel::auto::Reason;
 use crate::image::{ExrSamples, FileKind, LARGEST_HALF, Picture, beyond_half};
@@ -100,13 +100,13 @@ fn structure<'w>(task: &Task, shot: &Shot, world: &'w World, settings: &Settings
 
 fn textures<'s>(job: &RenderJob, scene: &'s Scene) -> TextureStore<'s> {
     let textures = TextureStore::new(scene);
-    if job.everything { textures.with_everything() } else { textures }
+    if job.no_prune { textures.without_pruning() } else { textures }
 }
 
 /// The settings that apply to the pictures of a scene.
 fn effective(task: &Task, scene: &Scene) -> Result<Effective, Exit> {
     match Effective::new(&task.job.look, scene) {
-        Ok(effective) => Ok(effective.with_everything(task.job.everything)),
+        Ok(effective) => Ok(effective.without_pruning(task.job.no_prune)),
         Err(text) => Err(task.fail(&Diagnostic::new("scene-value", task.file(), "", text), Exit::Input)),
     }
 }
@@ -279,10 +279,10 @@ impl Prepared<'_> {
     fn warn(&self, so_far: &mut SoFar) -> bool {
         let Task { job, messages, .. } = *self.task;
         let Self { shot, work, .. } = self;
-        so_far.shown = so_far.shown || self.is_frame && unseen::shows_something(work);
+        so_far.shown = so_far.shown || self.is_frame && empty_picture::shows_something(work);
         let unseen = match self.is_frame {
             true => None,
-            false => unseen::warning(work, (&shot.choice, self.phrase), job.look.lens, self.task.file()),
+            false => empty_picture::warning(work, (&shot.choice, self.phrase), job.look.lens, self.task.file()),
         };
         // All around a model it is the same.
         if let Some(warning) = &unseen

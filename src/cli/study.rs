@@ -2,11 +2,11 @@
 
 use super::args::StudyArgs;
 use super::exit::Exit;
-use super::job::Wrong;
+use super::job::UsageError;
 use super::message::Messages;
-use super::seen::{self, Seen};
+use super::viewed::{self, ViewedModel};
 use super::writable::{self, Sources};
-use super::{accident, interrupt, meter, picture, sampling};
+use super::{interrupt, meter, panics, picture, sampling};
 use crate::accel::{AccelParams, auto};
 use crate::bench::study::report::{Format, text};
 use crate::bench::study::{Plan, Study, Subject, measure, reference, settings};
@@ -21,7 +21,7 @@ use std::path::PathBuf;
 /// Loads the model, renders it with every setting, and prints and writes rows as they come.
 pub(super) fn run(args: &StudyArgs) -> Exit {
     let messages = Messages::new(args.model.messages.into(), args.quiet);
-    let typed = |path: &PathBuf| Ok((path.clone(), Format::from_path(path).map_err(Wrong)?));
+    let typed = |path: &PathBuf| Ok((path.clone(), Format::from_path(path).map_err(UsageError)?));
     let files: Vec<(PathBuf, Format)> = match args.report.iter().map(typed).collect() {
         Ok(files) => files,
         Err(wrong) => return messages.wrong(wrong),
@@ -30,7 +30,7 @@ pub(super) fn run(args: &StudyArgs) -> Exit {
         return messages.fail(&fault, Exit::Failed);
     }
     let name = args.model.input.display().to_string();
-    accident::guard(&name, &messages, || match threads::pool(args.threads.map_or(0, usize::from)) {
+    panics::guard(&name, &messages, || match threads::pool(args.threads.map_or(0, usize::from)) {
         Ok(pool) => pool.install(|| study(args, &files, &name, &messages).unwrap_or_else(|exit| exit)),
         Err(e) => {
             messages.error("threads", format!("no threads can be started: {e}"), "ask for fewer (--threads)");
@@ -40,14 +40,14 @@ pub(super) fn run(args: &StudyArgs) -> Exit {
 }
 
 fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &Messages) -> Result<Exit, Exit> {
-    let Seen { loaded, world, view, phrase } = seen::model(&args.model, &args.eye, args.size, messages)?;
+    let ViewedModel { loaded, world, view, phrase } = viewed::model(&args.model, &args.eye, args.size, messages)?;
     let sources = Sources::of(&loaded.facts.files);
     args.report
         .iter()
         .try_for_each(|path| sources.spared_by(path, "--report"))
         .map_err(|fault| messages.fail(&fault, Exit::Failed))?;
     let scene = &loaded.scene;
-    let base = Settings { seed: args.seed, ..seen::settings(args.size, None, &scene.hints) };
+    let base = Settings { seed: args.seed, ..viewed::settings(args.size, None, &scene.hints) };
     let tone_map = picture::tone_map(args.tone_map, scene).map_err(|why| {
         messages.fail(&Diagnostic::new("scene-value", args.model.input.as_path(), "", why), Exit::Input)
     })?;

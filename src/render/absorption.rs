@@ -11,14 +11,14 @@ use crate::scene::{Material, Reflection};
 pub(crate) struct Absorption(Vec<Vec3>);
 
 impl Absorption {
-    /// Those of all materials; with `everything` also where all are zero.
-    pub(crate) fn of(materials: &[Material], everything: bool) -> Self {
+    /// Those of all materials; with `no_prune` also where all are zero.
+    pub(crate) fn of(materials: &[Material], no_prune: bool) -> Self {
         let coefficient = |material: &Material| match &material.reflection {
             Reflection::MetalRough(m) if m.thick && m.transmission > 0.0 => m.absorption,
             _ => Vec3::ZERO,
         };
         let all: Vec<Vec3> = materials.iter().map(coefficient).collect();
-        Self(if everything || all.iter().any(|a| *a != Vec3::ZERO) { all } else { Vec::new() })
+        Self(if no_prune || all.iter().any(|a| *a != Vec3::ZERO) { all } else { Vec::new() })
     }
 
     /// Whether there is any.

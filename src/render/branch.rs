@@ -1,12 +1,12 @@
 //! The rays that go on from a shaded point: mirrored, refracted, split by wavelength, spread by roughness.
 
 use super::context::Context;
-use super::draws::{Purpose, Spread};
-use super::glare::Calm;
+use super::draws::{Purpose, SampleSet};
 use super::glint::{self, MIRROR};
+use super::hotspot::HotspotSampled;
 use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};
-use super::shade::{Balance, Lobe, Matter, Seen, above, has_inside};
+use super::shade::{BounceWeights, Bsdf, Lobe, ShadingFrame, above, has_inside};
 use super::wave::{Crossing, Medium, Path, RayClass};
 use super::whitted::Tracer;
 use crate::accel::{Accel, Hit, NO_PRIM, Ray};
@@ -14,12 +14,12 @@ use crate::math::Vec3;
 use crate::scene::Material;
 
 /// What rays that go on ask of the surface they start on.
-pub(super) trait Ground {
+pub(super) trait ShadingPoint {
     /// Its material, by number too.
     fn material(&self) -> (u32, &Material);
 
     /// How it is seen.
-    fn seen(&self) -> Seen;
+    fn seen(&self) -> ShadingFrame;
 
     /// Whether the front of the face was hit.
     fn is_front(&self) -> bool;
@@ -54,7 +54,7 @@ pub(super) trait Ground {
 }
 
 /// A shaded point and the ray that found it.
-pub(super) struct Point<'a, G> {
+pub(super) struct PathVertex<'a, G> {
     pub ray: &'a Ray,
     pub hit: &'a Hit,
     /// The ray so far, its weight that of the surface.
@@ -62,15 +62,15 @@ pub(super) struct Point<'a, G> {
     /// Width of the ray's cone here.
     pub width: f32,
     pub surface: &'a G,
-    pub matter: &'a Matter,
+    pub bsdf: &'a Bsdf,
     /// Whether it lies where the ray has crossed another surface just before.
     pub touches: bool,
 }
 
-impl<G: Ground> Point<'_, G> {
+impl<G: ShadingPoint> PathVertex<'_, G> {
     /// The indices on both sides for light of `band`.
     pub(super) fn crossing(&self, context: &Context, band: Option<u8>) -> Crossing {
-        let Some((ior, dispersion)) = self.matter.refraction() else { return self.path.media.pass() };
+        let Some((ior, dispersion)) = self.bsdf.refraction() else { return self.path.media.pass() };
         let band = band.and_then(|i| context.bands.get(usize::from(i)));
         let ior = match band {
             #[expect(clippy::cast_possible_truncation, reason = "indices are given in f32")]
@@ -82,8 +82,8 @@ impl<G: Ground> Point<'_, G> {
         self.path.media.cross(Medium { material: self.surface.material().0, ior }, self.surface.is_front())
     }
 
-    pub(super) fn balance(&self, crossing: &Crossing) -> Balance {
-        self.matter.balance(self.cosine(), crossing)
+    pub(super) fn bounce_weights(&self, crossing: &Crossing) -> BounceWeights {
+        self.bsdf.bounce_weights(self.cosine(), crossing)
     }
 
     /// A ray that starts here, and what it comes from: see [`Queue`](super::wave::Queue).
@@ -98,7 +98,7 @@ impl<G: Ground> Point<'_, G> {
 
     /// Cosine of the view.
     fn cosine(&self) -> f32 {
-        let Seen { normal, view, .. } = self.surface.seen();
+        let ShadingFrame { normal, view, .. } = self.surface.seen();
         normal.dot(view)
     }
 
@@ -110,7 +110,7 @@ impl<G: Ground> Point<'_, G> {
             weight,
             depth,
             straight: false,
-            calm: false,
+            skips_hotspot: false,
             since: 0.0,
             cone_width: self.width,
             cone_spread,
@@ -123,55 +123,55 @@ impl<G: Ground> Point<'_, G> {
 pub(super) struct Rough {
     pub lobe: Lobe,
     pub rays: u32,
-    spread: Spread,
-    /// Whether rays that it mirrors, and those that it lets through, see no glare.
-    calm: Calm,
+    spread: SampleSet,
+    /// Whether rays that it mirrors, and those that it lets through, see no hotspot.
+    hotspot_sampled: HotspotSampled,
 }
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     /// Queues the secondary rays of a point that have enough weight.
-    pub(super) fn reflect_and_refract<G: Ground>(&mut self, point: &Point<G>, crossing: &Crossing) {
+    pub(super) fn reflect_and_refract<G: ShadingPoint>(&mut self, point: &PathVertex<G>, crossing: &Crossing) {
         // A volume that bends nothing is clear however rough its surface is.
         let bends = crossing.n_i != crossing.n_t || !has_inside(point.surface.material().1);
-        if let Some(lobe) = point.matter.lobe(point.surface.seen().normal).filter(|_| bends) {
+        if let Some(lobe) = point.bsdf.lobe(point.surface.seen().normal).filter(|_| bends) {
             return self.spread(point, crossing, lobe);
         }
-        let balance = point.balance(crossing);
-        let weight = point.path.weight * balance.refracted;
+        let bounce_weights = point.bounce_weights(crossing);
+        let weight = point.path.weight * bounce_weights.refracted;
         if !self.splits(point) || !self.context.is_alive(weight, point.path.part) {
-            self.reflect(point, balance.reflected);
+            self.reflect(point, bounce_weights.reflected);
             return self.send_refracted(point, weight, crossing, point.path.band);
         }
         // White light splits: each part of the spectrum has its own index from here on, and its own share that is mirrored.
         let cosine = point.cosine();
-        self.reflect(point, self.split_balance(point, cosine).reflected);
+        self.reflect(point, self.split_bounce_weights(point, cosine).reflected);
         for (i, band) in (0u8..).zip(&self.context.bands) {
             let crossing = point.crossing(self.context, Some(i));
-            let weight = point.path.weight * point.matter.balance(cosine, &crossing).refracted * band.color;
+            let weight = point.path.weight * point.bsdf.bounce_weights(cosine, &crossing).refracted * band.color;
             self.send_refracted(point, weight, &crossing, Some(i));
         }
     }
 
     /// The balance of light that has all its wavelengths, of which each has its own.
-    fn split_balance<G: Ground>(&self, point: &Point<G>, cosine: f32) -> Balance {
-        let mut all = Balance::default();
+    fn split_bounce_weights<G: ShadingPoint>(&self, point: &PathVertex<G>, cosine: f32) -> BounceWeights {
+        let mut all = BounceWeights::default();
         for (i, band) in (0u8..).zip(&self.context.bands) {
-            let balance = point.matter.balance(cosine, &point.crossing(self.context, Some(i)));
-            all.reflected += balance.reflected * band.color;
-            all.glass += balance.glass * band.color;
-            all.refracted += balance.refracted * band.color;
+            let bounce_weights = point.bsdf.bounce_weights(cosine, &point.crossing(self.context, Some(i)));
+            all.reflected += bounce_weights.reflected * band.color;
+            all.glass += bounce_weights.glass * band.color;
+            all.refracted += bounce_weights.refracted * band.color;
         }
         all
     }
 
     /// Whether light that is let in here has all its wavelengths still, and loses sight of some.
-    pub(super) fn splits<G>(&self, point: &Point<G>) -> bool {
-        let disperses = point.matter.refraction().is_some_and(|(_, dispersion)| dispersion > 0.0);
-        disperses && point.matter.lets_light_in() && point.path.band.is_none()
+    pub(super) fn splits<G>(&self, point: &PathVertex<G>) -> bool {
+        let disperses = point.bsdf.refraction().is_some_and(|(_, dispersion)| dispersion > 0.0);
+        disperses && point.bsdf.lets_light_in() && point.path.band.is_none()
     }
 
     /// Spreads rays over what a rough surface mirrors and lets through: several off the first, one off what those find.
-    fn spread<G: Ground>(&mut self, point: &Point<G>, crossing: &Crossing, lobe: Lobe) {
+    fn spread<G: ShadingPoint>(&mut self, point: &PathVertex<G>, crossing: &Crossing, lobe: Lobe) {
         let rays = if point.path.depth == 0 { self.context.gloss.rays } else { 1 };
         self.by_chance.get_mut(point.ray.sample as usize).into_iter().for_each(|by_chance| *by_chance = true);
         // The same facets mirror and let through, so that nothing is lost between both.
@@ -179,9 +179,9 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         #[expect(clippy::cast_possible_truncation, reason = "a handful")]
         let points = if splits { rays.max(self.context.bands.len() as u32) } else { rays };
         let spread = self.draws(point, Purpose::Facets).spread(points);
-        let mut rough = Rough { lobe, rays, spread, calm: Calm::default() };
-        rough.calm = self.ask_for_glare(point, crossing, &rough);
-        self.send_lacquer(point);
+        let mut rough = Rough { lobe, rays, spread, hotspot_sampled: HotspotSampled::default() };
+        rough.hotspot_sampled = self.ask_for_glare(point, crossing, &rough);
+        self.send_coat(point);
         for k in 0..rays {
             self.send_off_facet(point, crossing, &rough, k);
         }
@@ -197,38 +197,41 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     /// Mirrors the `k`th ray off a facet.
-    fn send_off_facet<G: Ground>(&mut self, point: &Point<G>, crossing: &Crossing, rough: &Rough, k: u32) {
-        let Seen { normal, geometric, view, .. } = point.surface.seen();
+    fn send_off_facet<G: ShadingPoint>(&mut self, point: &PathVertex<G>, crossing: &Crossing, rough: &Rough, k: u32) {
+        let ShadingFrame { normal, geometric, view, .. } = point.surface.seen();
         let facet = rough.lobe.facet(view, rough.spread.point(k));
         let cosine = view.dot(facet);
-        let balance =
-            if self.splits(point) { self.split_balance(point, cosine) } else { point.matter.balance(cosine, crossing) };
+        let bounce_weights = if self.splits(point) {
+            self.split_bounce_weights(point, cosine)
+        } else {
+            point.bsdf.bounce_weights(cosine, crossing)
+        };
         let mirrored = reflect(-view, facet);
-        let share = balance.mirrored(rough.lobe.sent(view, mirrored));
+        let share = bounce_weights.mirrored(rough.lobe.sent(view, mirrored));
         let to = above(mirrored, normal);
         if share != Vec3::ZERO && normal.dot(to) > 0.0 {
             let weight = point.path.weight * share * (1.0 / rough.rays as f32);
             self.send_spread(point, above(to, geometric), (RayClass::Reflected, MIRROR), rough, |path| Path {
                 weight,
-                calm: rough.calm.mirrored,
+                skips_hotspot: rough.hotspot_sampled.mirrored,
                 ..path.turned(RayClass::Reflected, k + 1)
             });
         }
     }
 
     /// Lets the `k`th ray through a facet.
-    fn send_through_facet<G: Ground>(
+    fn send_through_facet<G: ShadingPoint>(
         &mut self,
-        point: &Point<G>,
+        point: &PathVertex<G>,
         crossing: &Crossing,
         rough: &Rough,
         k: u32,
         band: Option<u8>,
         color: Vec3,
     ) {
-        let Seen { normal, geometric, view, .. } = point.surface.seen();
+        let ShadingFrame { normal, geometric, view, .. } = point.surface.seen();
         let facet = rough.lobe.facet(view, rough.spread.point(k));
-        let share = point.matter.balance(view.dot(facet), crossing).refracted;
+        let share = point.bsdf.bounce_weights(view.dot(facet), crossing).refracted;
         if !self.context.is_alive(point.path.weight * share * color, point.path.part) {
             return;
         }
@@ -250,14 +253,14 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             band,
             media,
             straight,
-            calm: rough.calm.through,
+            skips_hotspot: rough.hotspot_sampled.through,
             ..path.turned(RayClass::Refracted, k + 1)
         });
     }
 
-    fn send_spread<G: Ground>(
+    fn send_spread<G: ShadingPoint>(
         &mut self,
-        point: &Point<G>,
+        point: &PathVertex<G>,
         dir: Vec3,
         (class, turns): (RayClass, f32),
         rough: &Rough,
@@ -278,33 +281,33 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         self.starting[class as usize].push(ray, Path { cone_spread, scattered, ..path }, after);
     }
 
-    /// Queues what lacquer mirrors.
-    fn send_lacquer<G: Ground>(&mut self, point: &Point<G>) {
-        if let Some((lacquer, share)) = point.matter.lacquer() {
-            self.send_reflected(point, lacquer, point.path.weight * share, point.path.band);
+    /// Queues what clear coat mirrors.
+    fn send_coat<G: ShadingPoint>(&mut self, point: &PathVertex<G>) {
+        if let Some((coat, share)) = point.bsdf.coat_reflection() {
+            self.send_reflected(point, coat, point.path.weight * share, point.path.band);
         }
     }
 
-    /// Queues what is mirrored by the surface and by lacquer over it: one ray where both have the same normal.
-    fn reflect<G: Ground>(&mut self, point: &Point<G>, reflected: Vec3) {
+    /// Queues what is mirrored by the surface and by clear coat over it: one ray where both have the same normal.
+    fn reflect<G: ShadingPoint>(&mut self, point: &PathVertex<G>, reflected: Vec3) {
         let (weight, normal, band) = (point.path.weight, point.surface.seen().normal, point.path.band);
-        match point.matter.lacquer() {
-            Some((lacquer, share)) if lacquer == normal => {
+        match point.bsdf.coat_reflection() {
+            Some((coat, share)) if coat == normal => {
                 self.send_reflected(point, normal, weight * (reflected + share), band);
             }
             _ => {
                 self.send_reflected(point, normal, weight * reflected, band);
-                self.send_lacquer(point);
+                self.send_coat(point);
             }
         }
     }
 
     /// Whether a branch that begins here goes on, and with which weight.
-    fn goes_on<G>(&self, point: &Point<G>, path: &mut Path) -> bool {
+    fn goes_on<G>(&self, point: &PathVertex<G>, path: &mut Path) -> bool {
         self.roulette.spin(&self.streams, point.ray.sample, path)
     }
 
-    fn send_reflected<G: Ground>(&mut self, point: &Point<G>, normal: Vec3, weight: Vec3, band: Option<u8>) {
+    fn send_reflected<G: ShadingPoint>(&mut self, point: &PathVertex<G>, normal: Vec3, weight: Vec3, band: Option<u8>) {
         if !self.context.is_alive(weight, point.path.part) {
             return;
         }
@@ -312,13 +315,19 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if !self.goes_on(point, &mut path) {
             return;
         }
-        let Seen { geometric, view, .. } = point.surface.seen();
+        let ShadingFrame { geometric, view, .. } = point.surface.seen();
         let dir = above(reflect(-view, normal), geometric);
         let ray = point.surface.ray(dir, point.ray.sample);
         self.starting[RayClass::Reflected as usize].push(ray, path, Hit::MISS);
     }
 
-    fn send_refracted<G: Ground>(&mut self, point: &Point<G>, weight: Vec3, crossing: &Crossing, band: Option<u8>) {
+    fn send_refracted<G: ShadingPoint>(
+        &mut self,
+        point: &PathVertex<G>,
+        weight: Vec3,
+        crossing: &Crossing,
+        band: Option<u8>,
+    ) {
         if !self.context.is_alive(weight, point.path.part) {
             return;
         }
@@ -332,7 +341,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             }
             return self.continuing[RayClass::Refracted as usize].push_behind(*point.ray, path, *point.hit);
         }
-        let Seen { normal, geometric, view, .. } = point.surface.seen();
+        let ShadingFrame { normal, geometric, view, .. } = point.surface.seen();
         let (n_i, n_t) = (f64::from(crossing.n_i), f64::from(crossing.n_t));
         let Some(bent) = refract(-view, normal, n_i, n_t) else {
             // Total reflection by a hair that the balance did not see.

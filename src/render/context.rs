@@ -3,16 +3,16 @@
 use super::Settings;
 use super::absorption::Absorption;
 use super::ahead::Ahead;
+use super::alpha_voids::{AlphaFilter, AlphaVoids, Cones};
 use super::certainty;
-use super::clearings::{Before, Clearings, Cones};
 use super::fireflies::Fireflies;
 use super::frame::sample_width;
 use super::glint;
 use super::observer::Observer;
 use super::sampling::Sampling;
 use super::shade::{Band, LocalLight, bands};
+use super::shading_batch::MaterialConstants;
 use super::sky::Sky;
-use super::strip::Common;
 use super::texture::TextureStore;
 use super::wave::RayClass;
 use super::world::World;
@@ -56,11 +56,11 @@ pub(crate) struct Context<'a> {
     pub lights: Vec<LocalLight>,
     /// What is known of each material for all points of it; `None` where it takes more, or where each point must be
     /// looked at.
-    pub common: Arc<[Option<Common>]>,
+    pub common: Arc<[Option<MaterialConstants>]>,
     /// Parts of the spectrum; empty unless a material disperses light.
     pub bands: Vec<Band>,
     /// Where rays find nothing for certain.
-    pub clearings: Option<Arc<Clearings<'a>>>,
+    pub alpha_voids: Option<Arc<AlphaVoids<'a>>>,
     /// Whether anything but opaque surfaces can stand before a light.
     pub has_filters: bool,
     /// How strongly the insides of materials absorb light.
@@ -96,7 +96,7 @@ pub(crate) struct Context<'a> {
     /// Branches whose largest weight is below this end.
     pub cutoff: f32,
     /// Whether what the scene does without is done all the same.
-    pub everything: bool,
+    pub no_prune: bool,
 }
 
 /// Which rough surfaces spread how many rays.
@@ -134,13 +134,13 @@ impl Gloss {
 
     /// Whether it does, and is rough in some place.
     fn spreads_far(self, material: &Material) -> bool {
-        self.spreads(material) && material.metal_rough().is_some_and(|m| m.roughness > 0.0 || m.grain.is_some())
+        self.spreads(material) && material.metal_rough().is_some_and(|m| m.roughness > 0.0 || m.anisotropy.is_some())
     }
 }
 
 impl<'a> Context<'a> {
     pub(crate) fn new(scene: &'a Scene, world: &'a World, textures: &'a TextureStore<'a>, settings: &Settings) -> Self {
-        let everything = settings.everything;
+        let no_prune = settings.no_prune;
         let features = Features::of(scene);
         let together = samples_together(settings);
         let gloss = Gloss::new(settings.gloss_rays).shared_by(together).of_samples(settings);
@@ -151,13 +151,15 @@ impl<'a> Context<'a> {
             sky.find_glare();
         }
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
-        let ways = ways_around(sky.is_map(), features.has(Feature::Translucence), features.has(Feature::MetalRough));
+        let ways =
+            ways_around(sky.is_map(), features.has(Feature::DiffuseTransmission), features.has(Feature::MetalRough));
         let env_rays = shared_env_rays(env_rays, together, ways);
         let lights: Vec<LocalLight> = scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect();
         let light_rays = settings.light_rays.max(1).div_ceil(together);
-        let alone = everything || settings.one_by_one;
-        let common = |m: (u32, &Material)| if alone { None } else { Common::of(m, textures, depth > 0, gloss) };
-        let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
+        let alone = no_prune || settings.one_by_one;
+        let common =
+            |m: (u32, &Material)| if alone { None } else { MaterialConstants::of(m, textures, depth > 0, gloss) };
+        let needs = |any: &[Feature]| no_prune || any.iter().any(|&f| features.has(f));
         Self {
             scene,
             world,
@@ -177,14 +179,14 @@ impl<'a> Context<'a> {
             lights,
             common: (0..).zip(&scene.materials).map(common).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
-            clearings: (!everything).then(|| Clearings::of(scene, world, textures)).flatten().map(Arc::new),
-            has_filters: everything || !world.is_opaque(),
-            absorption: Absorption::of(&scene.materials, everything),
+            alpha_voids: (!no_prune).then(|| AlphaVoids::of(scene, world, textures)).flatten().map(Arc::new),
+            has_filters: no_prune || !world.is_opaque(),
+            absorption: Absorption::of(&scene.materials, no_prune),
             shows_environment: scene.background == Some(Background::Environment),
             lets_background_through: features.has(Feature::ThinTransmission) || features.has(Feature::Refraction),
             depth,
             cutoff: settings.cutoff,
-            everything,
+            no_prune,
         }
     }
 
@@ -197,16 +199,16 @@ impl<'a> Context<'a> {
         (class, samples): (RayClass, usize),
         rays: &'r [Ray],
         cones: Cones<'r>,
-    ) -> Option<Before<'r, 'a>> {
+    ) -> Option<AlphaFilter<'r, 'a>> {
         let each = 2 * self.gloss.rays as usize + self.bands.len() + 2;
         let in_order = self.depth == 0 || class == RayClass::Primary && samples.saturating_mul(each) < FOLLOWERS;
-        let clearings = self.clearings.as_ref().filter(|_| P::PASSES_GAPS && in_order)?;
-        Some(clearings.before(rays, cones))
+        let alpha_voids = self.alpha_voids.as_ref().filter(|_| P::PASSES_GAPS && in_order)?;
+        Some(alpha_voids.before(rays, cones))
     }
 
     /// Whether shadow rays ask on their way what lets light through, and how much.
     pub(super) fn asks_filters(&self) -> bool {
-        self.has_filters && !self.everything
+        self.has_filters && !self.no_prune
     }
 
     /// The same with other random choices, and other samples.
@@ -215,8 +217,8 @@ impl<'a> Context<'a> {
         Self { seed: settings.seed, highlight_reach, gloss, ahead: None, ..self.clone() }
     }
 
-    /// Whether rays to glare end at this material: rays that pass it may go on another way, or many, and leave some light behind
-    /// by the angle at which they meet it.
+    /// Whether rays to hotspot end at this material: rays that pass it may go on another way, or many, and leave some light
+    /// behind by the angle at which they meet it.
     pub(super) fn turns(&self, material: &Material) -> bool {
         material.reflection.transmits()
     }
@@ -266,7 +268,7 @@ fn shared_env_rays(rays: u32, together: u32, ways: u32) -> u32 {
 
 /// As many points as send hardly more rays together than may wait.
 fn points_at_a_time(lights: &[LocalLight], light_rays: u32, env_rays: u32, gloss: Gloss) -> usize {
-    let rays = |light: &LocalLight| if light.is_wide() { light_rays as usize } else { 1 };
+    let rays = |light: &LocalLight| if light.is_area() { light_rays as usize } else { 1 };
     let to_lights: usize = lights.iter().filter(|light| light.shadows).map(rays).sum();
     let points = (SHADOW_LIMIT / to_lights.max(1)).min(AROUND_LIMIT / (env_rays as usize).max(1));
     let points = points.min(FOLLOWERS / (gloss.rays as usize).max(1));

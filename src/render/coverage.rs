@@ -1,8 +1,8 @@
 //! How much of a picture shows something, as rays spread over it tell.
 
-use super::eyes::{Ball, Eye, Place};
+use super::primary_rays::{Ball, Eye, Place};
 use super::shade::Reader;
-use super::surface::{Surface, Target};
+use super::surface::{HitPrim, Surface};
 use super::wave::Media;
 use super::{Job, sobol};
 use crate::accel::{Accel, Hit, NoProbe, Ray};
@@ -96,7 +96,7 @@ fn only_hits((rays, hits): (Vec<Ray>, Vec<Hit>)) -> (Vec<Ray>, Vec<Hit>) {
 
 /// Whether a ray sees what it hits.
 fn is_there(job: &Job, ray: &Ray, hit: &Hit) -> bool {
-    let target = Target::new(job.scene, job.world, hit.prim);
+    let target = HitPrim::new(job.scene, job.world, hit.prim);
     let material = target.material;
     let surface = Surface::new(job.world, target, ray, hit, 0.0);
     let reader = Reader { store: job.textures, patch: surface.patch.as_ref(), known: &[] };

@@ -42,7 +42,7 @@ impl Curve {
 
 /// The rays that find what stands between a point and a light.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Feelers {
+pub(crate) struct ShadowRays {
     /// Towards the light.
     pub ray: Ray,
     /// From the triangle to where that ray starts, if it starts above it: what is in between hides the light as well.
@@ -52,7 +52,7 @@ pub(crate) struct Feelers {
 impl Surface<'_> {
     /// The rays that must meet nothing if light that is above the [horizon](Self::horizon) is to arrive here; `None` where
     /// the triangle itself hides it.
-    pub(crate) fn feelers(&self, incident: &Incident, sample: u32) -> Option<Feelers> {
+    pub(crate) fn shadow_rays(&self, incident: &Incident, sample: u32) -> Option<ShadowRays> {
         let cosine = self.geometric.dot(incident.to_light);
         if cosine < STEEP
             && let Some(lift) = self.lift()
@@ -64,12 +64,12 @@ impl Surface<'_> {
             // Its own triangle may be in the way of a ray that starts above it.
             let ray = Ray { origin: start, t_min: 0.0, dir, t_max, exclude: NO_PRIM, sample };
             let riser = Ray { origin: foot, t_min: 0.0, dir: lift, t_max: 1.0, exclude: self.target.prim, sample };
-            return Some(Feelers { ray, riser: Some(riser) });
+            return Some(ShadowRays { ray, riser: Some(riser) });
         }
         if cosine <= 0.0 {
             return None;
         }
-        Some(Feelers { ray: self.straight_feeler(incident, sample), riser: None })
+        Some(ShadowRays { ray: self.straight_feeler(incident, sample), riser: None })
     }
 
     /// The ray from the triangle itself to a light on either side of it.

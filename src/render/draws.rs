@@ -30,7 +30,7 @@ enum From {
 
 /// Points that fill the unit square evenly.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Spread {
+pub(crate) enum SampleSet {
     /// A lattice, moved as a whole.
     Moved([f32; 2]),
     /// A part of a sequence that begins with this index.
@@ -44,8 +44,8 @@ pub(crate) enum Purpose {
     Facets,
     Surroundings,
     Roulette,
-    Shadows,
-    Glare,
+    ShadowQueue,
+    Hotspot,
 }
 
 impl Draws {
@@ -68,18 +68,18 @@ impl Draws {
     }
 
     /// A sequence that is independent of those taken before, for so many points.
-    pub(crate) fn spread(&mut self, points: u32) -> Spread {
+    pub(crate) fn spread(&mut self, points: u32) -> SampleSet {
         match &mut self.0 {
-            From::Hit(random) => Spread::Moved([random.unit(), random.unit()]),
+            From::Hit(random) => SampleSet::Moved([random.unit(), random.unit()]),
             From::Stream(stream, dimension) => {
                 *dimension = mix(*dimension, u32::MAX);
-                Spread::Part { key: mix(stream.key, *dimension), first: stream.index.wrapping_mul(points) }
+                SampleSet::Part { key: mix(stream.key, *dimension), first: stream.index.wrapping_mul(points) }
             }
         }
     }
 }
 
-impl Spread {
+impl SampleSet {
     /// Its `k`th point, both coordinates 0 ≤ x < 1.
     #[inline(always)]
     pub(crate) fn point(self, k: u32) -> [f32; 2] {
@@ -122,8 +122,8 @@ mod tests {
             Purpose::Facets,
             Purpose::Surroundings,
             Purpose::Roulette,
-            Purpose::Shadows,
-            Purpose::Glare,
+            Purpose::ShadowQueue,
+            Purpose::Hotspot,
         ];
         let mut points = all.map(|purpose| {
             let mut draws = Draws::at(0, &[], 0, &ray(1.0), &Hit { t: 1.0, ..Hit::MISS }, purpose);
@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn points_fill_the_square_evenly() {
-        let spread = Spread::Moved([0.3, 0.9]);
+        let spread = SampleSet::Moved([0.3, 0.9]);
         let mut cells = [0; 64];
         for k in 0..640 {
             let [x, y] = spread.point(k);

@@ -10,7 +10,7 @@ use super::context::Context;
 use super::optics::transmittance;
 use super::seam::{is_same_crossing, is_same_surface};
 use super::shade::{Reader, has_inside, shadow_filter};
-use super::surface::{Surface, Target};
+use super::surface::{HitPrim, Surface};
 use super::texture::TextureStore;
 use super::wave::{Media, Medium};
 use super::world::World;
@@ -47,7 +47,7 @@ pub(super) fn weaken(
     let (filter, is_hole) = match *left {
         Some(part) => (Vec3::splat(part), false),
         None => {
-            let target = Target::new(context.scene, context.world, hit.prim);
+            let target = HitPrim::new(context.scene, context.world, hit.prim);
             let filter = match unbent.is_some() && context.turns(target.material) {
                 true => Vec3::ZERO,
                 false => filter_at(context, &target, ray, hit, inside.filter(|_| !is_repeated)),
@@ -182,7 +182,7 @@ impl<'a> Through<'a> {
 impl OccludedFilter for Through<'_> {
     fn stops(&self, number: usize, prim: u32) -> bool {
         let (context, ray) = (self.context, &self.rays[number]);
-        if let Some(stops) = context.clearings.as_ref().and_then(|clearings| clearings.stops(ray, prim)) {
+        if let Some(stops) = context.alpha_voids.as_ref().and_then(|alpha_voids| alpha_voids.stops(ray, prim)) {
             return stops;
         }
         let shape = context.world.prim(prim);
@@ -195,7 +195,7 @@ impl OccludedFilter for Through<'_> {
         };
         let (t, u, v) = triangle::place(&space, &corners);
         let hit = Hit { t, u, v, prim };
-        let left = left_behind(context, &Target::new(context.scene, context.world, prim), &hit);
+        let left = left_behind(context, &HitPrim::new(context.scene, context.world, prim), &hit);
         let is_said = matches!(left, Some(0.0 | 1.0));
         if !is_said {
             self.note(number, Passed { hit, left });
@@ -205,7 +205,7 @@ impl OccludedFilter for Through<'_> {
 }
 
 /// What part of light is left behind a surface, where that is soon said.
-fn left_behind(context: &Context, target: &Target, hit: &Hit) -> Option<f32> {
+fn left_behind(context: &Context, target: &HitPrim, hit: &Hit) -> Option<f32> {
     if target.material.reflection.transmits() {
         return None;
     }
@@ -213,8 +213,14 @@ fn left_behind(context: &Context, target: &Target, hit: &Hit) -> Option<f32> {
 }
 
 /// What the surface at `hit` lets through. Maps are read at full sharpness: the shadow's own distance is unknown here.
-pub(super) fn filter_at(context: &Context, target: &Target, ray: &Ray, hit: &Hit, inside: Option<&mut Inside>) -> Vec3 {
-    if target.material.is_opaque() && !context.everything {
+pub(super) fn filter_at(
+    context: &Context,
+    target: &HitPrim,
+    ray: &Ray,
+    hit: &Hit,
+    inside: Option<&mut Inside>,
+) -> Vec3 {
+    if target.material.is_opaque() && !context.no_prune {
         return Vec3::ZERO;
     }
     if let Some(left) = left_behind(context, target, hit) {

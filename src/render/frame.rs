@@ -3,9 +3,9 @@
 use super::Settings;
 use super::certainty;
 use super::context::Context;
-use super::eyes::{Ball, Eye, Place, ThinLens};
 use super::immersion::media_around;
 use super::pixel::sample_offsets;
+use super::primary_rays::{Ball, Eye, Place, ThinLens};
 use super::sampling::Sampling;
 use super::sobol::{self, mix};
 use super::view::View;

@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::shade::has_inside;
-use super::surface::{Surface, Target};
+use super::surface::{HitPrim, Surface};
 use super::view::View;
 use super::wave::{Media, Medium};
 use crate::accel::{Accel, Hit, NoProbe, Ray};
@@ -48,7 +48,7 @@ fn left_along<A: Accel>(context: &Context, accel: &A, scratch: &mut A::Scratch, 
         if !hit[0].is_some() {
             break;
         }
-        let target = Target::new(context.scene, context.world, hit[0].prim);
+        let target = HitPrim::new(context.scene, context.world, hit[0].prim);
         if has_inside(target.material) {
             let entering = Surface::new(context.world, target, &ray, &hit[0], 0.0).front;
             let beyond = entered.cross(Medium { material: target.material_id, ior: 1.0 }, entering).beyond;

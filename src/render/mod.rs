@@ -4,7 +4,7 @@
 //! `wave`): eye rays, then the shadow rays of what they hit (`shadow`), then reflected and refracted rays,
 //! generation by generation. A hit becomes a `surface` once, its material is evaluated in `shade`, and [`optics`]
 //! says where light goes from there. Points of opaque surfaces need no more than formulas, which are computed for many of
-//! them side by side (`beside`, `strip`).
+//! them side by side (`beside`, `batch`).
 //!
 //! The pixels are the same bits for every structure and every number of threads: structures give equal hits, sums run
 //! in a fixed order within a tile, and transcendental functions are the crate's own.
@@ -12,45 +12,45 @@
 mod absorption;
 mod adaptive;
 mod ahead;
+mod alpha_voids;
 mod asking;
-mod beside;
 mod branch;
 mod by_class;
 mod certainty;
-mod clearings;
 mod context;
 mod costs;
 mod coverage;
 mod curve;
 mod draws;
-pub mod everything;
-mod eyes;
 mod filters;
 mod fireflies;
-mod footing;
 mod forecast;
 mod frame;
-mod glare;
 mod glint;
+mod hotspot;
 mod immersion;
 mod instancing;
 mod layers;
+mod lobe_frame;
+pub mod no_prune;
 pub(crate) mod observer;
 pub mod optics;
 mod part;
 mod patch;
 mod pixel;
+mod primary_rays;
 mod profile;
 mod roulette;
 mod sampling;
 mod seam;
 mod shade;
+mod shade_hits;
+mod shading_batch;
 mod shadow;
 mod sky;
 mod sobol;
 mod stochastic;
 pub mod story;
-mod strip;
 pub mod studio;
 mod surface;
 mod tail;
@@ -67,11 +67,11 @@ pub mod world;
 pub use by_class::ByClass;
 pub use costs::{Cost, Costs, render_costs};
 pub use coverage::{Coverage, coverage};
-pub use eyes::ThinLens;
 pub use filters::{Filters, Noted};
 pub use forecast::{Forecast, Interval, forecast};
 pub use instancing::Instancing;
 pub use observer::{Asked, Question, Tape};
+pub use primary_rays::ThinLens;
 pub use profile::{Profile, render_profiled};
 pub use sampling::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Split, Stochastic, Targeted};
 pub use surface::given_normal;
@@ -123,9 +123,9 @@ pub struct Settings {
     pub layers: bool,
     /// For measurements: whether each point of a surface is shaded by itself and none beside others; the same picture, later.
     pub one_by_one: bool,
-    /// For measurements: whether what the scene does without is done all the same, for nothing (see [`everything`]). The world and the
-    /// textures of the [`Job`] must be such, too.
-    pub everything: bool,
+    /// For measurements: whether what the scene does without is done all the same, for nothing (see [`no_prune`]). The
+    /// world and the textures of the [`Job`] must be such, too.
+    pub no_prune: bool,
 }
 
 impl Settings {
@@ -185,7 +185,7 @@ impl Default for Settings {
             walls: 1.0,
             layers: false,
             one_by_one: false,
-            everything: false,
+            no_prune: false,
         }
     }
 }

@@ -56,7 +56,7 @@ impl Roulette {
             return true;
         }
         let Some(&stream) = streams.get(sample as usize) else { return true };
-        let [drawn, _] = Draws::of(stream, mix(branch, number), Purpose::Shadows).spread(1).point(0);
+        let [drawn, _] = Draws::of(stream, mix(branch, number), Purpose::ShadowQueue).spread(1).point(0);
         let chance = most / least;
         *radiance *= 1.0 / chance;
         drawn < chance

@@ -2,10 +2,10 @@
 
 use super::asking::Asking;
 use super::context::Context;
-use super::curve::Feelers;
+use super::curve::ShadowRays;
 use super::filters::{Inside, Met, Passed, Through, filter_at, weaken};
 use super::observer::Observer;
-use super::surface::Target;
+use super::surface::HitPrim;
 use super::tail::Tail;
 use super::wave::Media;
 use crate::accel::{Accel, Hit, Ray};
@@ -15,7 +15,7 @@ use std::cell::RefCell;
 
 /// Shadow rays that wait, each with the light it lets through. Buffers of one worker.
 #[derive(Debug, Default)]
-pub(crate) struct Shadows {
+pub(crate) struct ShadowQueue {
     rays: Tail<Ray>,
     light: Tail<Bound>,
     /// What each is inside of; empty where nothing absorbs light.
@@ -48,7 +48,7 @@ pub(crate) struct Bound {
     pub tag: u32,
 }
 
-impl Shadows {
+impl ShadowQueue {
     pub(crate) fn len(&self) -> usize {
         self.rays.len()
     }
@@ -60,12 +60,12 @@ impl Shadows {
     }
 
     /// The same of a ray that may start above its surface.
-    pub(crate) fn push_feelers(&mut self, feelers: &Feelers, light: Vec3, media: Option<Media>) {
-        if let Some(riser) = feelers.riser {
+    pub(crate) fn push_feelers(&mut self, shadow_rays: &ShadowRays, light: Vec3, media: Option<Media>) {
+        if let Some(riser) = shadow_rays.riser {
             self.raised.push(self.rays.len());
             self.risers.push(riser);
         }
-        self.push(feelers.ray, light, media);
+        self.push(shadow_rays.ray, light, media);
     }
 
     /// The same as [`Self::push`] of a ray that ends at glass, and has left this hit, with `t` as far as it may meet the same
@@ -210,7 +210,7 @@ impl Shadows {
                     continue;
                 }
                 let light = &mut self.light[i].radiance;
-                let target = Target::new(context.scene, context.world, hits[k].prim);
+                let target = HitPrim::new(context.scene, context.world, hits[k].prim);
                 *light *= filter_at(context, &target, &ray, &hits[k], None);
                 self.blocked[i] |= is_dark(*light);
                 if !self.blocked[i] {

@@ -35,8 +35,8 @@ pub(crate) struct Path {
     pub depth: u32,
     /// Whether the ray still runs along the line of sight, so that what lies behind shows through.
     pub straight: bool,
-    /// Whether the glare of the sky was asked for where it was spread, so that it sees none.
-    pub calm: bool,
+    /// Whether the hotspot of the sky was asked for where it was spread, so that it sees none.
+    pub skips_hotspot: bool,
     /// Of a ray that goes on behind a hit, what it crossed last, where that was no hole; [`Hit::MISS`]: nothing.
     pub crossed: Hit,
     /// The part of the spectrum this ray carries, once dispersion has split it.
@@ -63,7 +63,7 @@ impl Path {
             part: 1.0,
             depth: 0,
             straight: true,
-            calm: false,
+            skips_hotspot: false,
             crossed: Hit::MISS,
             band: None,
             media,
@@ -75,9 +75,9 @@ impl Path {
         }
     }
 
-    /// The same behind the back of a one-sided face, which no ray sees, but which is in the way of those to glare.
+    /// The same behind the back of a one-sided face, which no ray sees, but which is in the way of those to hotspot.
     pub(crate) fn behind_back(self) -> Self {
-        Self { calm: false, ..self }
+        Self { skips_hotspot: false, ..self }
     }
 
     /// The same after a turn that no other ray from this point takes.

@@ -8,24 +8,24 @@
 //! back is no bounce.
 
 use super::Progress;
+use super::alpha_voids::Cones;
 use super::asking::Asking;
-use super::beside::Beside;
-use super::branch::{Ground, Point};
+use super::branch::{PathVertex, ShadingPoint};
 use super::by_class::ByClass;
-use super::clearings::Cones;
 use super::context::{AROUND_LIMIT, Context, FOLLOWERS, SHADOW_LIMIT};
 use super::draws::{Draws, Purpose, Stream};
-use super::everything::look_up_in_vain;
-use super::eyes::{Asks, Eyes};
 use super::glint;
 use super::layers::FirstSurface;
+use super::no_prune::look_up_in_vain;
 use super::observer::Observer;
+use super::primary_rays::{PrimaryQuery, PrimaryRays};
 use super::roulette::Roulette;
-use super::shade::{Incident, LocalLight, Matter, Reader};
-use super::shadow::Shadows;
-use super::sky::{Arounds, Standpoint};
+use super::shade::{Bsdf, Incident, LocalLight, Reader};
+use super::shade_hits::ShadingBuffers;
+use super::shadow::ShadowQueue;
+use super::sky::{EnvironmentPoint, EnvironmentRays};
 use super::sobol::mix;
-use super::surface::{Surface, Target};
+use super::surface::{HitPrim, Surface};
 use super::wave::{Crossing, Path, Queue, RayClass, Wave};
 use crate::accel::{Accel, Hit, HitQueries, IntersectFilter, Ray};
 use crate::math::{DVec3, Vec3};
@@ -52,17 +52,17 @@ pub(crate) struct Sample {
 pub(crate) struct Tracer<'a, A: Accel, P> {
     pub(super) context: &'a Context<'a>,
     asking: Asking<'a, A>,
-    pub eyes: Eyes,
+    pub eyes: PrimaryRays,
     /// Rays that start, by class.
     pub(super) starting: [Queue; 3],
     /// Rays that go on behind a hit, by class.
     pub(super) continuing: [Queue; 3],
     wave: Wave,
-    pub(super) beside: Beside,
-    pub(super) shadows: Shadows,
-    /// Rays to the glare of the sky.
-    pub(super) glares: Shadows,
-    arounds: Arounds,
+    pub(super) beside: ShadingBuffers,
+    pub(super) shadows: ShadowQueue,
+    /// Rays to the hotspot of the sky.
+    pub(super) hotspots: ShadowQueue,
+    environment_rays: EnvironmentRays,
     pub samples: Vec<Sample>,
     /// The place of each sample among those of its pixel; empty where only rays decide random choices.
     pub streams: Vec<Stream>,
@@ -80,14 +80,14 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         Self {
             context,
             asking: Asking::new(accel, progress),
-            eyes: Eyes::default(),
+            eyes: PrimaryRays::default(),
             starting: Default::default(),
             continuing: Default::default(),
             wave: Wave::default(),
-            beside: Beside::default(),
-            shadows: Shadows::default(),
-            glares: Shadows::default(),
-            arounds: Arounds::default(),
+            beside: ShadingBuffers::default(),
+            shadows: ShadowQueue::default(),
+            hotspots: ShadowQueue::default(),
+            environment_rays: EnvironmentRays::default(),
             samples: Vec::new(),
             streams: Vec::new(),
             roulette: Roulette::default(),
@@ -107,8 +107,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.counts.each_mut().into_iter().for_each(|probe| probe.batch(samples));
         self.starting.iter_mut().chain(&mut self.continuing).for_each(Queue::clear);
         self.shadows.clear();
-        self.glares.clear();
-        self.arounds.clear();
+        self.hotspots.clear();
+        self.environment_rays.clear();
         self.eyes.clear();
         self.streams.clear();
         self.roulette = Roulette::default();
@@ -157,9 +157,9 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     fn trace_eyes(&mut self) {
         let mut eyes = std::mem::take(&mut self.eyes);
         {
-            let Asks { rays, pencil, cones, hits } = eyes.ask();
+            let PrimaryQuery { rays, pencil, cones, hits } = eyes.ask();
             let of = (RayClass::Primary, self.samples.len());
-            let before = self.context.before::<P>(of, rays, Cones::Eyes(cones));
+            let before = self.context.before::<P>(of, rays, Cones::PrimaryRays(cones));
             let filter = before.as_ref().map(|before| before as &dyn IntersectFilter);
             let queries = HitQueries { rays, pencil: pencil.as_ref(), after: None, filter };
             self.asking.first_hits(&queries, hits, self.counts.of(RayClass::Primary));
@@ -204,16 +204,18 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if self.shadows.len() > 0 {
             self.shadows.trace(self.context, &mut self.asking, &mut self.counts.shadow, &mut arrive);
         }
-        if self.glares.len() > 0 {
-            self.glares.trace(self.context, &mut self.asking, &mut self.counts.shadow, &mut arrive);
+        if self.hotspots.len() > 0 {
+            self.hotspots.trace(self.context, &mut self.asking, &mut self.counts.shadow, &mut arrive);
         }
-        self.arounds.trace(self.context, &mut self.asking, &mut self.counts.shadow, arrive);
+        self.environment_rays.trace(self.context, &mut self.asking, &mut self.counts.shadow, arrive);
     }
 
     /// Traces shadow rays once many wait. In between a sample sees one point at most, so that in whatever order these are
     /// shaded, what comes of the rays is added to the same.
     pub(super) fn relieve(&mut self) {
-        if self.shadows.len() >= SHADOW_LIMIT || self.glares.len() >= SHADOW_LIMIT || self.arounds.len() >= AROUND_LIMIT
+        if self.shadows.len() >= SHADOW_LIMIT
+            || self.hotspots.len() >= SHADOW_LIMIT
+            || self.environment_rays.len() >= AROUND_LIMIT
         {
             self.trace_shadows();
         }
@@ -228,7 +230,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
         let (dir, sky) = (ray.dir.try_normalize().unwrap_or(Vec3::Z), &self.context.sky);
         let seen = match path.straight {
-            _ if path.calm => sky.calm(dir, path.cone_spread),
+            _ if path.skips_hotspot => sky.without_hotspot(dir, path.cone_spread),
             true => sky.behind(dir, path.cone_spread),
             false => sky.radiance(dir, path.cone_spread),
         };
@@ -241,11 +243,11 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let context = self.context;
         let lessened = context.absorption.is_some().then(|| context.absorption.lessened(ray, path, hit));
         let (before, path) = (path, lessened.as_ref().unwrap_or(path));
-        let target = Target::new(context.scene, context.world, hit.prim);
+        let target = HitPrim::new(context.scene, context.world, hit.prim);
         let material = target.material;
-        // Rays to glare end at what would turn them.
-        let seeing = path.calm && context.turns(material);
-        let seeing = seeing.then(|| [before, path].map(|path| Path { calm: false, ..*path }));
+        // Rays to hotspot end at what would turn them.
+        let seeing = path.skips_hotspot && context.turns(material);
+        let seeing = seeing.then(|| [before, path].map(|path| Path { skips_hotspot: false, ..*path }));
         let (before, path) = seeing.as_ref().map_or((before, path), |[before, path]| (before, path));
         let width = path.cone_width + path.cone_spread * hit.t;
         let mut surface = Surface::new(context.world, target, ray, hit, width);
@@ -267,46 +269,46 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         // Local colour: emitted, from everywhere, from each light.
         surface.shade_smoothly(context.textures);
         self.note(ray, path, &surface, base.truncate());
-        let matter = matter_seen(context, &surface, base.truncate(), path);
-        let point = Point {
+        let bsdf = matter_seen(context, &surface, base.truncate(), path);
+        let point = PathVertex {
             ray,
             hit,
             width,
             surface: &surface,
-            matter: &matter,
+            bsdf: &bsdf,
             touches,
             path: Path { weight: path.weight * covered, ..*path },
         };
-        if context.everything {
+        if context.no_prune {
             look_up_in_vain(&surface, context.textures);
         }
         let crossing = point.crossing(context, path.band);
-        if context.everything || !matter.is_dark() {
+        if context.no_prune || !bsdf.is_dark() {
             self.look_around(&point);
             self.light(&point, &crossing);
         }
 
         if path.depth < context.depth {
             self.reflect_and_refract(&point, &crossing);
-        } else if context.everything {
-            black_box(point.balance(&crossing));
+        } else if context.no_prune {
+            black_box(point.bounce_weights(&crossing));
         }
     }
 
     /// Adds what a point shows by itself and of its surroundings, or sends the rays that find what hides those.
-    pub(super) fn look_around<G: Ground>(&mut self, point: &Point<G>) {
-        let (context, surface, matter) = (self.context, point.surface, point.matter);
+    pub(super) fn look_around<G: ShadingPoint>(&mut self, point: &PathVertex<G>) {
+        let (context, surface, bsdf) = (self.context, point.surface, point.bsdf);
         let (weight, sample) = (point.path.weight, point.ray.sample);
-        let [open, through] = matter.ambient(&surface.seen(), &context.sky, context.scene.ambient);
-        if context.env_rays == 0 || matter.is_unlit() {
-            return self.add(sample, weight * (matter.emission + open + through));
+        let [open, through] = bsdf.ambient(&surface.seen(), &context.sky, context.scene.ambient);
+        if context.env_rays == 0 || bsdf.is_unlit() {
+            return self.add(sample, weight * (bsdf.emission + open + through));
         }
         // What is looked up through glass is seen on its other side, where these rays do not go.
-        self.add(sample, weight * (matter.emission + through));
+        self.add(sample, weight * (bsdf.emission + through));
         if open.is_finite() && open != Vec3::ZERO {
             let media = context.absorption.is_some().then_some(point.path.media);
             let (ray, draws) = (point.ray, self.draws(point, Purpose::Surroundings));
-            self.arounds.push(context, &Standpoint { surface, matter, ray, draws, weight, open, media });
+            self.environment_rays.push(context, &EnvironmentPoint { surface, bsdf, ray, draws, weight, open, media });
         }
     }
 
@@ -322,7 +324,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Numbers for the random choices of a point.
-    pub(super) fn draws<G>(&self, point: &Point<G>, purpose: Purpose) -> Draws {
+    pub(super) fn draws<G>(&self, point: &PathVertex<G>, purpose: Purpose) -> Draws {
         Draws::at(self.context.seed, &self.streams, point.path.branch, point.ray, point.hit, purpose)
     }
 
@@ -336,7 +338,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     fn note(&mut self, ray: &Ray, path: &Path, surface: &Surface, albedo: Vec3) {
         let Some(first) = self.firsts.get_mut(ray.sample as usize) else { return };
         if path.straight && !first.is_some() {
-            let Target { prim, instance, .. } = surface.target;
+            let HitPrim { prim, instance, .. } = surface.target;
             let at = (surface.position, surface.normal);
             *first = FirstSurface::new((prim, instance), at, albedo, self.context.world.center);
         }
@@ -349,11 +351,11 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Direct light, of wide lights from several of their points.
-    fn light(&mut self, point: &Point<Surface>, crossing: &Crossing) {
+    fn light(&mut self, point: &PathVertex<Surface>, crossing: &Crossing) {
         let (context, position) = (self.context, point.surface.position);
         let mut draws = None;
         for (number, light) in (0..).zip(&context.lights) {
-            if !light.is_wide() {
+            if !light.is_area() {
                 if let Some(incident) = light.incident(position) {
                     self.shine(point, crossing, (light, number), &incident, 1.0);
                 }
@@ -372,7 +374,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Light of one point of a light that is so much of it: without shadows at once, with them when its ray has come through.
     fn shine(
         &mut self,
-        point: &Point<Surface>,
+        point: &PathVertex<Surface>,
         crossing: &Crossing,
         (light, number): (&LocalLight, u32),
         incident: &Incident,
@@ -381,9 +383,9 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let (surface, to_light) = (point.surface, incident.to_light);
         let above = surface.horizon.dot(to_light) > 0.0;
         let seen = if above {
-            point.matter.lit(surface.horizon, surface.normal, surface.view, incident)
+            point.bsdf.lit(surface.horizon, surface.normal, surface.view, incident)
         } else {
-            point.matter.lit_through(surface.normal, surface.view, incident, crossing)
+            point.bsdf.lit_through(surface.normal, surface.view, incident, crossing)
         };
         let mut radiance = point.path.weight * seen * part;
         if !(radiance.is_finite() && radiance.max_element() > 0.0) {
@@ -401,31 +403,31 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if !above {
             return self.shadows.push(surface.straight_feeler(incident, sample), radiance, inside);
         }
-        if let Some(feelers) = surface.feelers(incident, sample) {
-            self.shadows.push_feelers(&feelers, radiance, inside);
+        if let Some(shadow_rays) = surface.shadow_rays(incident, sample) {
+            self.shadows.push_feelers(&shadow_rays, radiance, inside);
         }
     }
 }
 
 /// What a surface of this base colour is made of, as a ray of a path sees it.
-fn matter_seen(context: &Context, surface: &Surface, base: Vec3, path: &Path) -> Matter {
+fn matter_seen(context: &Context, surface: &Surface, base: Vec3, path: &Path) -> Bsdf {
     let material = surface.target.material;
-    let mut matter = Matter::new(surface, base, context.textures);
+    let mut bsdf = Bsdf::new(surface, base, context.textures);
     if path.scattered > SPREAD {
-        matter.blur(path.scattered);
+        bsdf.blur(path.scattered);
     }
     if !context.lights.is_empty() {
         let least = |map| glint::least_square(surface, map, context, path.cone_spread);
-        if matter.has_narrow_highlight() {
-            matter.widen_highlight(least((material.normal_map.as_ref(), material.normal_scale)));
+        if bsdf.has_narrow_highlight() {
+            bsdf.widen_highlight(least((material.normal_map.as_ref(), material.normal_scale)));
         }
-        if let Some(coat) = matter.coat.as_mut().filter(|coat| coat.has_narrow_highlight()) {
+        if let Some(coat) = bsdf.coat.as_mut().filter(|coat| coat.has_narrow_highlight()) {
             let of_coat = material.metal_rough().and_then(|m| m.coat.as_ref());
             coat.widen_highlight(least(of_coat.map_or((None, 1.0), |c| (c.normal_map.as_ref(), c.normal_scale))));
         }
     }
     if path.depth < context.depth && context.gloss.spreads(material) {
-        matter.spread_by_rays();
+        bsdf.spread_by_rays();
     }
-    matter
+    bsdf
 }

@@ -55,16 +55,16 @@ pub enum Feature {
     Refraction,
     /// Volumes that absorb light.
     Absorption,
-    /// Lacquer over a surface.
+    /// Clear coat over a surface.
     Coat,
     /// Surfaces that are rougher along a grain than across it.
-    Grain,
+    Anisotropy,
     /// Thin films, whose colours change with the angle.
-    Film,
+    Iridescence,
     /// Sheen of cloth.
     Sheen,
     /// Light that is scattered through surfaces.
-    Translucence,
+    DiffuseTransmission,
     /// An index of refraction that depends on the wavelength.
     Dispersion,
     /// Point lights.
@@ -118,10 +118,10 @@ impl Feature {
         Self::Refraction,
         Self::Absorption,
         Self::Coat,
-        Self::Grain,
-        Self::Film,
+        Self::Anisotropy,
+        Self::Iridescence,
         Self::Sheen,
-        Self::Translucence,
+        Self::DiffuseTransmission,
         Self::Dispersion,
         Self::PointLights,
         Self::DirectionalLights,
@@ -158,10 +158,10 @@ impl Feature {
             Self::Refraction => "refraction",
             Self::Absorption => "absorption",
             Self::Coat => "clearcoat",
-            Self::Grain => "anisotropy",
-            Self::Film => "iridescence",
+            Self::Anisotropy => "anisotropy",
+            Self::Iridescence => "iridescence",
             Self::Sheen => "sheen",
-            Self::Translucence => "diffuse transmission",
+            Self::DiffuseTransmission => "diffuse transmission",
             Self::Dispersion => "dispersion",
             Self::PointLights => "point lights",
             Self::DirectionalLights => "directional lights",
@@ -247,10 +247,10 @@ impl Features {
             Reflection::Phong(phong) => self.add_phong(phong),
             Reflection::MetalRough(pbr) => {
                 self.add_if(true, Feature::MetalRough);
-                self.add_if(pbr.grain.is_some(), Feature::Grain);
-                self.add_if(pbr.film.is_some(), Feature::Film);
+                self.add_if(pbr.anisotropy.is_some(), Feature::Anisotropy);
+                self.add_if(pbr.iridescence.is_some(), Feature::Iridescence);
                 self.add_if(pbr.sheen.is_some(), Feature::Sheen);
-                self.add_if(pbr.translucence.is_some(), Feature::Translucence);
+                self.add_if(pbr.diffuse_transmission.is_some(), Feature::DiffuseTransmission);
                 if let Some(coat) = &pbr.coat {
                     self.add_if(true, Feature::Coat);
                     self.add_if(coat.roughness < SMOOTH || coat.roughness_map.is_some(), Feature::Mirrors);

@@ -1,4 +1,4 @@
-//! What only some surfaces have besides the metallic-roughness model: lacquer, a thin film, sheen, a grain, light that is
+//! What only some surfaces have besides the metallic-roughness model: clear coat, a thin film, sheen, a grain, light that is
 //! scattered through them.
 
 use super::TextureRef;
@@ -7,7 +7,7 @@ use crate::math::Vec3;
 /// A clear dielectric layer of index 1.5 over a surface (KHR_materials_clearcoat).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coat {
-    /// 0: no lacquer … 1: it covers everything.
+    /// 0: no clear coat … 1: it covers everything.
     pub strength: f32,
     /// Linear map, red channel × `strength`.
     pub strength_map: Option<TextureRef>,
@@ -15,7 +15,7 @@ pub struct Coat {
     pub roughness: f32,
     /// Linear map, green channel × `roughness`.
     pub roughness_map: Option<TextureRef>,
-    /// Tangent-space normal map of the lacquer, linear; without one it is smooth, whatever the surface under it is.
+    /// Tangent-space normal map of the clear coat, linear; without one it is smooth, whatever the surface under it is.
     pub normal_map: Option<TextureRef>,
     /// Multiplies x and y of the normal map.
     pub normal_scale: f32,
@@ -35,7 +35,7 @@ impl Coat {
 
 /// A grain along which light is spread farther than across it (KHR_materials_anisotropy).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Grain {
+pub struct Anisotropy {
     /// 0: none … 1: along the grain the surface is as rough as can be.
     pub strength: f32,
     /// Turns the grain from the tangent towards the bitangent, radians.
@@ -46,7 +46,7 @@ pub struct Grain {
 
 /// A film so thin that light reflected off both its sides interferes (KHR_materials_iridescence).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Film {
+pub struct Iridescence {
     /// 0: no film … 1: it covers everything.
     pub strength: f32,
     /// Linear map, red channel × `strength`.
@@ -59,7 +59,7 @@ pub struct Film {
     pub thickness_map: Option<TextureRef>,
 }
 
-impl Film {
+impl Iridescence {
     /// Its maps.
     pub fn maps(&self) -> [&Option<TextureRef>; 2] {
         [&self.strength_map, &self.thickness_map]
@@ -100,7 +100,7 @@ impl Sheen {
 ///
 /// The surface counts as thin: light comes out where it went in, whatever KHR_materials_volume says of its inside.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Translucence {
+pub struct DiffuseTransmission {
     /// 0: all light that is scattered comes back … 1: all of it goes through.
     pub share: f32,
     /// Linear map, alpha channel × `share`.
@@ -111,7 +111,7 @@ pub struct Translucence {
     pub color_map: Option<TextureRef>,
 }
 
-impl Translucence {
+impl DiffuseTransmission {
     /// Its maps.
     pub fn maps(&self) -> [&Option<TextureRef>; 2] {
         [&self.share_map, &self.color_map]

@@ -1,6 +1,6 @@
 //! How a surface answers to light. Factors are linear; maps multiply them.
 
-use super::{Coat, Film, Grain, Sheen, Translucence};
+use super::{Anisotropy, Coat, DiffuseTransmission, Iridescence, Sheen};
 use crate::math::{Vec2, Vec3};
 
 /// A material. `base_color`, alpha, emission and the normal are common to every [`Reflection`] model.
@@ -88,14 +88,14 @@ pub struct MetalRough {
     /// How strongly `ior` depends on the wavelength: 20 / Abbe number, as KHR_materials_dispersion; 0: not at all.
     pub dispersion: f32,
     /// Light that is scattered through it.
-    pub translucence: Option<Box<Translucence>>,
+    pub diffuse_transmission: Option<Box<DiffuseTransmission>>,
     /// A grain, in whose direction it is rougher.
-    pub grain: Option<Box<Grain>>,
+    pub anisotropy: Option<Box<Anisotropy>>,
     /// A thin film on it.
-    pub film: Option<Box<Film>>,
+    pub iridescence: Option<Box<Iridescence>>,
     /// Fibres that stand off it.
     pub sheen: Option<Box<Sheen>>,
-    /// Lacquer over all that.
+    /// Clear coat over all that.
     pub coat: Option<Box<Coat>>,
 }
 
@@ -231,9 +231,9 @@ impl Default for MetalRough {
             thickness: 0.0,
             thickness_map: None,
             dispersion: 0.0,
-            translucence: None,
-            grain: None,
-            film: None,
+            diffuse_transmission: None,
+            anisotropy: None,
+            iridescence: None,
             sheen: None,
             coat: None,
         }
@@ -250,12 +250,12 @@ impl MetalRough {
             &self.transmission_map,
             &self.thickness_map,
         ];
-        let grain = self.grain.iter().map(|grain| &grain.map);
-        let film = self.film.iter().flat_map(|film| film.maps());
+        let anisotropy = self.anisotropy.iter().map(|anisotropy| &anisotropy.map);
+        let iridescence = self.iridescence.iter().flat_map(|iridescence| iridescence.maps());
         let sheen = self.sheen.iter().flat_map(|sheen| sheen.maps());
         let coat = self.coat.iter().flat_map(|coat| coat.maps());
-        let through = self.translucence.iter().flat_map(|translucence| translucence.maps());
-        own.into_iter().chain(through).chain(grain).chain(film).chain(sheen).chain(coat).flatten()
+        let through = self.diffuse_transmission.iter().flat_map(|diffuse_transmission| diffuse_transmission.maps());
+        own.into_iter().chain(through).chain(anisotropy).chain(iridescence).chain(sheen).chain(coat).flatten()
     }
 
     /// Every slot that can hold a map.
@@ -267,9 +267,11 @@ impl MetalRough {
             &mut self.transmission_map,
             &mut self.thickness_map,
         ];
-        slots.extend(self.translucence.iter_mut().flat_map(|translucence| translucence.maps_mut()));
-        slots.extend(self.grain.iter_mut().map(|grain| &mut grain.map));
-        slots.extend(self.film.iter_mut().flat_map(|film| film.maps_mut()));
+        slots.extend(
+            self.diffuse_transmission.iter_mut().flat_map(|diffuse_transmission| diffuse_transmission.maps_mut()),
+        );
+        slots.extend(self.anisotropy.iter_mut().map(|anisotropy| &mut anisotropy.map));
+        slots.extend(self.iridescence.iter_mut().flat_map(|iridescence| iridescence.maps_mut()));
         slots.extend(self.sheen.iter_mut().flat_map(|sheen| sheen.maps_mut()));
         slots.extend(self.coat.iter_mut().flat_map(|coat| coat.maps_mut()));
         slots
@@ -295,7 +297,7 @@ impl MetalRough {
 
     /// Whether it has anything besides the core model: what depends on the view at each point.
     pub fn has_lobes(&self) -> bool {
-        self.grain.is_some() || self.film.is_some() || self.sheen.is_some() || self.coat.is_some()
+        self.anisotropy.is_some() || self.iridescence.is_some() || self.sheen.is_some() || self.coat.is_some()
     }
 }
 

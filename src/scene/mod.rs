@@ -23,7 +23,7 @@ pub mod texture;
 pub use camera::{Camera, Projection};
 pub use hints::{MAX_DEPTH, MAX_STOPS, RenderHints};
 pub use light::{Falloff, Light, LightKind};
-pub use lobes::{Coat, Film, Grain, Sheen, Translucence};
+pub use lobes::{Anisotropy, Coat, DiffuseTransmission, Iridescence, Sheen};
 pub use material::{AlphaMode, Material, MetalRough, Phong, Reflection, TexCoords, TextureRef, UvTransform};
 pub use mesh::{Cone, Instance, Mesh, Plane, Polygon, Sphere};
 pub use panorama::Panorama;

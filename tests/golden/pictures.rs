@@ -9,8 +9,8 @@ use meshray::render::view::Lens;
 use meshray::render::{Adaptive, Sampling, Stochastic, ThinLens, View};
 use meshray::scene::mesh::Polygon;
 use meshray::scene::{
-    AlphaMode, Background, Coat, Falloff, Film, Filter, LightKind, Material, Mesh, MetalRough, Mipmaps, Phong, Sampler,
-    Sheen, TextureRef, Wrap,
+    AlphaMode, Background, Coat, Falloff, Filter, Iridescence, LightKind, Material, Mesh, MetalRough, Mipmaps, Phong,
+    Sampler, Sheen, TextureRef, Wrap,
 };
 use std::path::Path;
 
@@ -183,7 +183,7 @@ fn golden_thin_glass_passes_light_straight_and_reflects_at_grazing_angles() {
 }
 
 #[test]
-fn golden_lacquer_film_sheen_and_coloured_glass() {
+fn golden_coat_film_sheen_and_coloured_glass() {
     let mut stage = Stage::new([0.0, 0.9, 6.5], [0.0, 0.0, 0.0]);
     stage.studio();
     checkered_floor(&mut stage, -0.7);
@@ -198,7 +198,8 @@ fn golden_lacquer_film_sheen_and_coloured_glass() {
             normal_scale: 1.0,
         }
     };
-    let film = Film { strength: 1.0, strength_map: None, ior: 1.4, thickness: [100.0, 380.0], thickness_map: None };
+    let iridescence =
+        Iridescence { strength: 1.0, strength_map: None, ior: 1.4, thickness: [100.0, 380.0], thickness_map: None };
     let sheen = Sheen { color: Vec3::new(0.9, 0.5, 0.9), color_map: None, roughness: 0.5, roughness_map: None };
     let matt = MetalRough { metallic: 0.0, roughness: 0.8, ..MetalRough::default() };
     let absorption = MetalRough::absorption_of(Vec3::new(0.2, 0.6, 0.9), 1.0);
@@ -206,7 +207,10 @@ fn golden_lacquer_film_sheen_and_coloured_glass() {
     let surfaces = [
         ([0.7, 0.02, 0.02], MetalRough { coat: Some(Box::new(coat(0.0))), ..matt.clone() }),
         ([0.7, 0.02, 0.02], MetalRough { coat: Some(Box::new(coat(0.5))), ..matt.clone() }),
-        ([0.9, 0.9, 0.9], MetalRough { metallic: 1.0, roughness: 0.3, film: Some(Box::new(film)), ..matt.clone() }),
+        (
+            [0.9, 0.9, 0.9],
+            MetalRough { metallic: 1.0, roughness: 0.3, iridescence: Some(Box::new(iridescence)), ..matt.clone() },
+        ),
         ([0.1, 0.05, 0.2], MetalRough { sheen: Some(Box::new(sheen)), ..matt }),
         ([1.0, 1.0, 1.0], glass),
     ];

@@ -88,7 +88,7 @@ pub struct Rays {
     pub class: Class,
     /// Asked by the picture.
     pub asked: u64,
-    /// InstancedObjects and measured.
+    /// Kept and measured.
     pub kept: usize,
 }
 

@@ -6,10 +6,10 @@ mod scene;
 mod spd;
 
 use super::exit::Exit;
-use super::job::{self, Wrong};
+use super::job::{self, UsageError};
 use super::message::{Messages, Severity};
 use super::writable::{self, Sources};
-use super::{accident, interrupt};
+use super::{interrupt, panics};
 use crate::accel::{AccelKind, AccelParams};
 use crate::bench::compare::{Plan, compare};
 use crate::bench::machine::Machine;
@@ -72,7 +72,7 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
     let mut worst = Exit::Done;
     for subject in subjects(args) {
         let name = subject.to_string();
-        worst = worst.max(accident::guard(&name, &bench.messages, || bench.model(&subject, &mut report)));
+        worst = worst.max(panics::guard(&name, &bench.messages, || bench.model(&subject, &mut report)));
         if interrupt::raised() {
             return Exit::Interrupted;
         }
@@ -105,12 +105,12 @@ fn subjects(args: &BenchArgs) -> Vec<Subject> {
     }
 }
 
-fn plan(args: &BenchArgs) -> Result<Plan, Wrong> {
+fn plan(args: &BenchArgs) -> Result<Plan, UsageError> {
     job::check_stdin(&args.inputs)?;
     let mut kinds: Vec<AccelKind> = Vec::new();
     for kind in &args.accel {
         if kinds.contains(kind) {
-            return Err(Wrong(format!("--accel names {kind} twice")));
+            return Err(UsageError(format!("--accel names {kind} twice")));
         }
         kinds.push(*kind);
     }
@@ -119,10 +119,12 @@ fn plan(args: &BenchArgs) -> Result<Plan, Wrong> {
     }
     if let [a, b] = args.compare[..] {
         if a == b || !kinds.contains(&a) || !kinds.contains(&b) {
-            return Err(Wrong(format!("--compare {a},{b}: name two different structures that are measured (--accel)")));
+            return Err(UsageError(format!(
+                "--compare {a},{b}: name two different structures that are measured (--accel)"
+            )));
         }
     } else if !args.compare.is_empty() {
-        return Err(Wrong("--compare takes two structures, such as grid,fast-bvh".into()));
+        return Err(UsageError("--compare takes two structures, such as grid,fast-bvh".into()));
     }
     let params = job::params(&args.params, &kinds)?;
     if let Some(sweep) = &args.sweep {
@@ -141,32 +143,34 @@ fn plan(args: &BenchArgs) -> Result<Plan, Wrong> {
 }
 
 /// Those of `kinds` that the sweep changes.
-fn swept(sweep: &Sweep, kinds: Vec<AccelKind>, params: &AccelParams) -> Result<Vec<AccelKind>, Wrong> {
+fn swept(sweep: &Sweep, kinds: Vec<AccelKind>, params: &AccelParams) -> Result<Vec<AccelKind>, UsageError> {
     let parameter = sweep.parameter;
     if parameter.is_set(params) {
-        return Err(Wrong(format!("--sweep {parameter} and --{parameter} set the same parameter; use one of them")));
+        return Err(UsageError(format!(
+            "--sweep {parameter} and --{parameter} set the same parameter; use one of them"
+        )));
     }
     if let Some(flag) = parameter.overruled_by(params) {
-        return Err(Wrong(format!("--sweep {parameter} changes nothing beside --{flag}; leave one of them out")));
+        return Err(UsageError(format!("--sweep {parameter} changes nothing beside --{flag}; leave one of them out")));
     }
     let is_changed = |kind: &AccelKind| parameter.changes(*kind, params);
     let kinds: Vec<AccelKind> = kinds.into_iter().filter(is_changed).collect();
     if kinds.is_empty() {
         let others: Vec<&str> = AccelKind::ALL.iter().filter(|kind| is_changed(kind)).map(|kind| kind.name()).collect();
         let others = others.join(", ");
-        return Err(Wrong(format!("--sweep {parameter} changes none of these structures; it changes {others}")));
+        return Err(UsageError(format!("--sweep {parameter} changes none of these structures; it changes {others}")));
     }
     Ok(kinds)
 }
 
-fn files(args: &BenchArgs) -> Result<Vec<(PathBuf, Format)>, Wrong> {
-    let typed = |path: &PathBuf| Ok((path.clone(), Format::from_path(path).map_err(Wrong)?));
-    let files: Vec<(PathBuf, Format)> = args.report.iter().map(typed).collect::<Result<_, Wrong>>()?;
+fn files(args: &BenchArgs) -> Result<Vec<(PathBuf, Format)>, UsageError> {
+    let typed = |path: &PathBuf| Ok((path.clone(), Format::from_path(path).map_err(UsageError)?));
+    let files: Vec<(PathBuf, Format)> = args.report.iter().map(typed).collect::<Result<_, UsageError>>()?;
     let of_pages = [("--compare", !args.compare.is_empty()), ("--heatmap-max", args.heatmap_max.is_some())];
     if let Some((flag, _)) = of_pages.iter().find(|(_, typed)| *typed)
         && files.iter().all(|(_, format)| *format != Format::Html)
     {
-        return Err(Wrong(format!("{flag} is for the heat maps of an HTML report: add --report PATH.html")));
+        return Err(UsageError(format!("{flag} is for the heat maps of an HTML report: add --report PATH.html")));
     }
     Ok(files)
 }

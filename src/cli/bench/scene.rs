@@ -3,7 +3,7 @@
 use super::super::camera::Choice;
 use super::super::exit::Exit;
 use super::super::message::Messages;
-use super::super::{picture, read, seen};
+use super::super::{picture, read, viewed};
 use super::args::BenchArgs;
 use crate::accel::{AccelChoice, AccelKind, AccelParams};
 use crate::bench::pruning::Pruning;
@@ -102,11 +102,11 @@ impl Prepared {
         let world =
             subject.world(&loaded, args.load.limits().memory).map_err(|fault| messages.fail(&fault, Exit::Failed))?;
         if world.is_empty() {
-            return Err(messages.fail(&seen::nothing_to_hit(input), Exit::Input));
+            return Err(messages.fail(&viewed::nothing_to_hit(input), Exit::Input));
         }
-        let found = seen::eye(&mut loaded.scene, (&choice, None), args.size, input);
+        let found = viewed::eye(&mut loaded.scene, (&choice, None), args.size, input);
         let (view, view_phrase) = found.map_err(|fault| messages.fail(&fault, Exit::Input))?;
-        let usual = seen::settings(args.size, args.depth, &loaded.scene.hints);
+        let usual = viewed::settings(args.size, args.depth, &loaded.scene.hints);
         let settings = Settings { samples: args.samples, seed: args.seed, ..usual };
         Ok(Self { loaded, world, settings, view_phrase, view })
     }
@@ -118,9 +118,9 @@ impl Prepared {
 
     /// What leaving out saves that the scene does not need; `None` when no thread can be started.
     pub(super) fn pruning(&self, passes: usize) -> Option<Pruning> {
-        let world = self.world.clone().with_everything();
-        let textures = TextureStore::new(&self.loaded.scene).with_everything();
-        let settings = Settings { everything: true, ..self.settings.clone() };
+        let world = self.world.clone().without_pruning();
+        let textures = TextureStore::new(&self.loaded.scene).without_pruning();
+        let settings = Settings { no_prune: true, ..self.settings.clone() };
         self.job_in(&world, &textures, &settings, |everything| {
             self.with_job(|usual| Pruning::measure(usual, everything, passes))
         })

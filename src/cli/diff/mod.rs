@@ -16,7 +16,7 @@ mod report;
 use super::exit::Exit;
 use super::message::{Messages, Severity};
 use super::writable::{self, Sources};
-use super::{accident, interrupt, output_name};
+use super::{interrupt, output_name, panics};
 use crate::image::diff::{
     Difference, LayerDifference, Looks, Space, compare, greatest, layer_differences, looks, side_by_side,
 };
@@ -57,7 +57,7 @@ impl Compared {
 /// Compares, prints what was found, and draws it.
 pub(super) fn run(args: &DiffArgs) -> Exit {
     let messages = Messages::new(args.messages.into(), false);
-    accident::guard(&args.actual.display().to_string(), &messages, || {
+    panics::guard(&args.actual.display().to_string(), &messages, || {
         let drawn = check_outputs(args).and_then(|()| compared(args, &messages)).and_then(|compared| {
             draw(args, &compared)?;
             Ok(compared)

@@ -21,7 +21,7 @@ mod topology;
 use super::args::ModelArgs;
 use super::exit::Exit;
 use super::message::Messages;
-use super::{accident, read};
+use super::{panics, read};
 use crate::render::Instancing;
 pub(super) use args::InspectArgs;
 use report::Report;
@@ -29,7 +29,7 @@ use report::Report;
 /// Loads the file and prints what was found.
 pub(super) fn run(args: &InspectArgs) -> Exit {
     let messages = Messages::new(args.model.messages.into(), false);
-    accident::guard(&args.model.input.display().to_string(), &messages, || inspect(args, &messages))
+    panics::guard(&args.model.input.display().to_string(), &messages, || inspect(args, &messages))
 }
 
 fn inspect(args: &InspectArgs, messages: &Messages) -> Exit {

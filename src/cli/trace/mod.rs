@@ -26,12 +26,12 @@ mod words;
 
 use super::camera::{Choice, LensChoice};
 use super::exit::Exit;
-use super::job::{self, Look, Wrong};
+use super::job::{self, Look, UsageError};
 use super::message::{Messages, Severity};
 use super::picture::{Effective, background};
 use super::sampling::SamplingArgs;
 use super::writable::{self, Sources};
-use super::{accident, interrupt, read, seen};
+use super::{interrupt, panics, read, viewed};
 use crate::accel::{AccelKind, AccelParams};
 use crate::image::{FileKind, Metadata};
 use crate::load::{Diagnostic, Loaded};
@@ -65,18 +65,18 @@ pub(super) fn run(args: &TraceArgs) -> Exit {
     match checked {
         Ok((look, params)) => {
             let name = args.model.input.display().to_string();
-            accident::guard(&name, &messages, || trace(args, &look, &params, &name, &messages).unwrap_or_else(|e| e))
+            panics::guard(&name, &messages, || trace(args, &look, &params, &name, &messages).unwrap_or_else(|e| e))
         }
         Err(wrong) => messages.wrong(wrong),
     }
 }
 
 /// What the command line says about the picture that the ray is part of.
-fn check(args: &TraceArgs) -> Result<Look, Wrong> {
+fn check(args: &TraceArgs) -> Result<Look, UsageError> {
     if let Some(path) = &args.output
         && FileKind::from_path(path).ok() != Some(FileKind::Png)
     {
-        return Err(Wrong("-o writes a PNG; end its name in .png".into()));
+        return Err(UsageError("-o writes a PNG; end its name in .png".into()));
     }
     Ok(Look {
         size: args.size,
@@ -102,7 +102,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     let limit = args.model.load.limits().memory;
     let world = read::as_drawn(&loaded, how, limit, file).map_err(fail(Exit::Failed))?;
     if world.is_empty() {
-        return Err(fail(Exit::Input)(seen::nothing_to_hit(file)));
+        return Err(fail(Exit::Input)(viewed::nothing_to_hit(file)));
     }
     let wrong = |text: String| Diagnostic::new("scene-value", file, "", text);
     let effective = Effective::new(look, &loaded.scene).map_err(wrong).map_err(fail(Exit::Input))?;
@@ -113,14 +113,14 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     let choice = Choice::of(&args.eye, args.up_vector).map_err(|wrong| messages.wrong(wrong))?;
     let size = (settings.width, settings.height);
     let (view, view_phrase) =
-        seen::eye(&mut loaded.scene, (&choice, look.lens), size, file).map_err(fail(Exit::Input))?;
+        viewed::eye(&mut loaded.scene, (&choice, look.lens), size, file).map_err(fail(Exit::Input))?;
     loaded.scene.background = Some(background(look.background, &loaded.scene));
     let (accel, _) = world.structure_for(settings.fewest_eye_rays(), args.accel, params);
     let textures = TextureStore::new(&loaded.scene);
     let job = Job { scene: &loaded.scene, world: &world, accel: &accel, textures: &textures, view: &view, settings };
     let story = tell(&job, args.pixel, args.sample).ok_or_else(|| {
         let text = format!("the picture has no pixel {:?} or no sample {} of it", args.pixel, args.sample);
-        messages.wrong(Wrong(text))
+        messages.wrong(UsageError(text))
     })?;
     let told = Told {
         name,
@@ -145,16 +145,16 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
 }
 
 /// Whether there is such a pixel with such a sample.
-fn inside(args: &TraceArgs, settings: &Settings) -> Result<(), Wrong> {
+fn inside(args: &TraceArgs, settings: &Settings) -> Result<(), UsageError> {
     let ((x, y), (width, height)) = (args.pixel, (settings.width, settings.height));
     if x >= width || y >= height {
-        return Err(Wrong(format!(
+        return Err(UsageError(format!(
             "pixel {x},{y} is outside the picture of {width}×{height}; columns and rows count from 0 at the top left"
         )));
     }
     if args.sample >= args.samples {
         let (sample, samples) = (args.sample, args.samples);
-        return Err(Wrong(format!("--sample {sample} is not one of {samples}, counted from 0; raise --samples")));
+        return Err(UsageError(format!("--sample {sample} is not one of {samples}, counted from 0; raise --samples")));
     }
     Ok(())
 }

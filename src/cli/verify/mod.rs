@@ -14,11 +14,11 @@ mod args;
 mod report;
 
 use super::exit::Exit;
-use super::job::Wrong;
+use super::job::UsageError;
 use super::message::Messages;
 use super::progress::Progress;
 use super::writable::{self, Sources};
-use super::{accident, interrupt, read};
+use super::{interrupt, panics, read};
 use crate::bench::report::Format;
 use crate::bench::verify::{Findings, Plan, kernels, verify};
 use crate::load::{Diagnostic, Loaded};
@@ -29,7 +29,7 @@ use std::path::Path;
 /// Loads the file, judges it and prints what was found.
 pub(super) fn run(args: &VerifyArgs) -> Exit {
     let messages = Messages::new(args.model.messages.into(), args.quiet);
-    accident::guard(&args.model.input.display().to_string(), &messages, || {
+    panics::guard(&args.model.input.display().to_string(), &messages, || {
         judge(args, &messages).unwrap_or_else(|exit| exit)
     })
 }
@@ -39,7 +39,7 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Result<Exit, Exit> {
     if let Some(path) = &args.plot {
         if Format::from_path(path) != Ok(Format::Html) {
             let text = format!("--plot {}: a page for a browser ends in .html", path.display());
-            return Err(messages.wrong(Wrong(text)));
+            return Err(messages.wrong(UsageError(text)));
         }
         writable::check(path, "--plot", &Sources::of([&args.model.input])).map_err(fail)?;
     }

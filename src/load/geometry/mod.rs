@@ -3,13 +3,13 @@
 //! The text of an OBJ leaves it ([`obj`](super::obj)), files of other formats hold nothing else ([`bare`]). It is centred in
 //! `f64` and rounded ([`place`](super::place)), and becomes one mesh and one instance for each run (`assemble`), points and
 //! lines (`strokes`) get a width ([`wires`](super::wires)), materials come from the MTL files or pictures that it names
-//! ([`mtl`](super::mtl), `bare::pictures`); `finish` is the whole way.
+//! ([`mtl`](super::mtl), `plain_mesh::pictures`); `finish` is the whole way.
 
 mod assemble;
-pub(super) mod bare;
 pub(super) mod color;
 pub(super) mod finish;
 mod pairs;
+pub(super) mod plain_mesh;
 mod smooth;
 #[cfg(test)]
 pub(super) mod sound;
@@ -32,9 +32,9 @@ pub(super) struct Geometry {
     /// vertices, and no normals: most scans. [`Self::faces`] and what goes with them are empty then.
     pub triangles: Vec<[u32; 3]>,
     /// Where these stand in the file; empty where the line of each is its number.
-    pub stretches: Vec<Stretch>,
+    pub stretches: Vec<FaceSpan>,
     pub faces: Vec<Face>,
-    pub strokes: Vec<Stroke>,
+    pub strokes: Vec<WireStatement>,
     /// Whether every vertex is a point instead, which has the normal of the same number; coordinates do not count.
     pub is_cloud: bool,
     pub runs: Vec<Run>,
@@ -76,13 +76,13 @@ impl Face {
 
 /// Faces that follow each other line by line, with as many corners each, and all else that they share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Stretch {
+pub(super) struct FaceSpan {
     /// The first of them.
     pub face: Face,
     pub count: u32,
 }
 
-impl Stretch {
+impl FaceSpan {
     /// The `i`th of them; the one behind the last is what may be added.
     pub(super) fn face(&self, i: u32) -> Face {
         let Face { line, number, first, arity, .. } = self.face;
@@ -100,7 +100,7 @@ impl Stretch {
 
 /// One `p` or `l` statement, without its corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Stroke {
+pub(super) struct WireStatement {
     /// Which of [`Geometry::runs`].
     pub run: u32,
     /// Where it stands in the file.
@@ -130,9 +130,9 @@ impl Geometry {
         let mut stretches = std::mem::take(&mut self.stretches);
         if stretches.is_empty() {
             let face = Face { run: 0, smoothing: 0, arity: 3, line: 0, number: 0, first: 0 };
-            stretches.push(Stretch { face, count: triangles.len() as u32 });
+            stretches.push(FaceSpan { face, count: triangles.len() as u32 });
         }
-        self.faces = Stretch::all(&stretches);
+        self.faces = FaceSpan::all(&stretches);
     }
 
     /// Makes every vertex a point; the `i`th has the `i`th normal where there are as many.

@@ -3,7 +3,7 @@
 use super::assemble::{Key, colors, fill_vertices, name};
 use super::pairs::Pairs;
 use super::soup::{Corner, NONE, Soup};
-use super::{Geometry, Stroke};
+use super::{Geometry, WireStatement};
 use crate::load::place::Placed;
 use crate::load::wires::Wires;
 use crate::math::{DVec3, Vec3};
@@ -16,7 +16,7 @@ pub(super) fn assemble(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Vec
     if geometry.is_cloud && !soup.positions.is_empty() {
         return vec![(0, cloud(geometry, soup, placed))];
     }
-    let mut of_run: BTreeMap<u32, Vec<(Stroke, &[Corner])>> = BTreeMap::new();
+    let mut of_run: BTreeMap<u32, Vec<(WireStatement, &[Corner])>> = BTreeMap::new();
     let mut rest = soup.stroke_corners.as_slice();
     for stroke in &geometry.strokes {
         let (corners, after) = rest.split_at(stroke.arity as usize);
@@ -27,7 +27,7 @@ pub(super) fn assemble(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Vec
         return Vec::new();
     }
     let mut vertices = Pairs::new(soup.positions.len());
-    let mut build = |(run, strokes): (u32, Vec<(Stroke, &[Corner])>)| {
+    let mut build = |(run, strokes): (u32, Vec<(WireStatement, &[Corner])>)| {
         vertices.clear();
         let mut wires = wires(&strokes, soup, placed, &mut vertices);
         wires.mesh.name = name(geometry, run);
@@ -60,7 +60,7 @@ fn normals(mut normals: Vec<Vec3>) -> Vec<Vec3> {
     normals
 }
 
-fn wires(strokes: &[(Stroke, &[Corner])], soup: &Soup, placed: &Placed, vertices: &mut Pairs<Key>) -> Wires {
+fn wires(strokes: &[(WireStatement, &[Corner])], soup: &Soup, placed: &Placed, vertices: &mut Pairs<Key>) -> Wires {
     let mut ends = Vec::new();
     let mut numbers = Vec::new();
     for (stroke, corners) in strokes {

@@ -341,7 +341,7 @@ mod tests {
             include_str!("links.rs"),
             include_str!("mesh.rs"),
             include_str!("mod.rs"),
-            include_str!("placed.rs"),
+            include_str!("cameras_lights.rs"),
             include_str!("schema.rs"),
             include_str!("skin.rs"),
             include_str!("sparse.rs"),

@@ -4,7 +4,8 @@ use super::mesh::Needs;
 use super::textures::Textures;
 use crate::math::Vec3;
 use crate::scene::{
-    AlphaMode, Coat, Film, Grain, Material, MetalRough, Reflection, Sheen, TexCoords, TextureRef, Translucence,
+    AlphaMode, Anisotropy, Coat, DiffuseTransmission, Iridescence, Material, MetalRough, Reflection, Sheen, TexCoords,
+    TextureRef,
 };
 use gltf::json;
 use gltf::json::material as source;
@@ -47,15 +48,15 @@ pub(super) fn convert(source: &json::Material, textures: &mut Textures) -> Mater
 pub(super) fn needs(material: &Material) -> Needs {
     let m = material.metal_rough();
     let of_coat = m.and_then(|m| m.coat.as_ref()?.normal_map.as_ref());
-    let grain = m.and_then(|m| m.grain.as_ref());
+    let anisotropy = m.and_then(|m| m.anisotropy.as_ref());
     // It follows coordinates as they are: the transform of a map moves what that says.
-    let along = |map: &TextureRef| match grain {
+    let along = |map: &TextureRef| match anisotropy {
         Some(_) => TexCoords { set: map.uv_set, ..TexCoords::default() },
         None => map.coordinates(),
     };
     // One without a map runs along the tangents of the first set.
-    let of_grain = grain.map(|grain| grain.map.as_ref().map(along).unwrap_or_default());
-    let tangents = material.normal_map.as_ref().or(of_coat).map(along).or(of_grain);
+    let of_anisotropy = anisotropy.map(|anisotropy| anisotropy.map.as_ref().map(along).unwrap_or_default());
+    let tangents = material.normal_map.as_ref().or(of_coat).map(along).or(of_anisotropy);
     let mut uv_sets: Vec<u32> =
         material.textures().map(|map| map.uv_set).chain(tangents.map(|along| along.set)).collect();
     uv_sets.sort_unstable();
@@ -153,9 +154,12 @@ fn metal_rough(source: &json::Material, textures: &mut Textures) -> MetalRough {
     }
     let other = |name: &str| extensions.others.get(name);
     let through = other("KHR_materials_diffuse_transmission");
-    surface.translucence = through.and_then(|through| translucence(through, textures)).map(Box::new);
-    surface.grain = other("KHR_materials_anisotropy").and_then(|grain| self::grain(grain, textures)).map(Box::new);
-    surface.film = other("KHR_materials_iridescence").and_then(|film| self::film(film, textures)).map(Box::new);
+    surface.diffuse_transmission = through.and_then(|through| diffuse_transmission(through, textures)).map(Box::new);
+    surface.anisotropy =
+        other("KHR_materials_anisotropy").and_then(|anisotropy| self::anisotropy(anisotropy, textures)).map(Box::new);
+    surface.iridescence = other("KHR_materials_iridescence")
+        .and_then(|iridescence| self::iridescence(iridescence, textures))
+        .map(Box::new);
     surface.sheen = other("KHR_materials_sheen").and_then(|sheen| self::sheen(sheen, textures)).map(Box::new);
     surface.coat = other("KHR_materials_clearcoat").and_then(|coat| self::coat(coat, textures)).map(Box::new);
     surface
@@ -174,9 +178,9 @@ fn color_of(extension: &Value, name: &str, default: f32) -> Vec3 {
 }
 
 /// KHR_materials_anisotropy; `None` where its strength is zero.
-fn grain(extension: &Value, textures: &mut Textures) -> Option<Grain> {
+fn anisotropy(extension: &Value, textures: &mut Textures) -> Option<Anisotropy> {
     let strength = number_of(extension, "anisotropyStrength", 0.0, (0.0, 1.0));
-    (strength > 0.0).then(|| Grain {
+    (strength > 0.0).then(|| Anisotropy {
         strength,
         rotation: number_of(extension, "anisotropyRotation", 0.0, (f32::MIN, f32::MAX)),
         map: map_of(extension, "anisotropyTexture", textures),
@@ -184,11 +188,11 @@ fn grain(extension: &Value, textures: &mut Textures) -> Option<Grain> {
 }
 
 /// KHR_materials_iridescence; `None` where its strength is zero.
-fn film(extension: &Value, textures: &mut Textures) -> Option<Film> {
+fn iridescence(extension: &Value, textures: &mut Textures) -> Option<Iridescence> {
     let strength = number_of(extension, "iridescenceFactor", 0.0, (0.0, 1.0));
     let thickness = |name: &str, default| number_of(extension, name, default, (0.0, f32::MAX));
     let mut map = |name: &str| map_of(extension, name, textures);
-    (strength > 0.0).then(|| Film {
+    (strength > 0.0).then(|| Iridescence {
         strength,
         strength_map: map("iridescenceTexture"),
         ior: number_of(extension, "iridescenceIor", 1.3, (1.0, f32::MAX)),
@@ -210,10 +214,10 @@ fn sheen(extension: &Value, textures: &mut Textures) -> Option<Sheen> {
 }
 
 /// KHR_materials_diffuse_transmission; `None` where nothing goes through.
-fn translucence(extension: &Value, textures: &mut Textures) -> Option<Translucence> {
+fn diffuse_transmission(extension: &Value, textures: &mut Textures) -> Option<DiffuseTransmission> {
     let share = number_of(extension, "diffuseTransmissionFactor", 0.0, (0.0, 1.0));
     let mut map = |name: &str| map_of(extension, name, textures);
-    (share > 0.0).then(|| Translucence {
+    (share > 0.0).then(|| DiffuseTransmission {
         share,
         share_map: map("diffuseTransmissionTexture"),
         color: color_of(extension, "diffuseTransmissionColorFactor", 1.0),

@@ -1,10 +1,10 @@
 //! Which scene of the file is drawn, and what stands where in it.
 
 use super::accessor::{Pick, Reader, Unreadable};
+use super::cameras_lights;
 use super::choice;
 use super::codes::Code;
 use super::graph::Graph;
-use super::placed;
 use super::report::Report;
 use super::schema::whole;
 use crate::load::Diagnostic;
@@ -97,7 +97,7 @@ pub(super) fn walk(
         stack.extend(node.children.iter().flatten().rev().map(|child| (child.value(), is_shown)));
         let world = graph.world.get(i).copied().unwrap_or_default();
         // What hides a node hides no camera (KHR_node_visibility).
-        let camera = placed::camera(root, node, world, walk.report);
+        let camera = cameras_lights::camera(root, node, world, walk.report);
         walk.placed.cameras.extend(camera);
         walk.light(node, world, is_shown);
         if is_shown {
@@ -129,7 +129,7 @@ impl Walk<'_, '_> {
         if !is_shown && !self.played.switches {
             return;
         }
-        let mut light = placed::light(self.reader.root, node, world, self.report);
+        let mut light = cameras_lights::light(self.reader.root, node, world, self.report);
         if let Some(light) = light.as_mut().filter(|_| !is_shown) {
             light.intensity = Vec3::ZERO;
         }

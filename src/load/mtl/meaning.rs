@@ -15,7 +15,7 @@ use super::writer::{Writer, light};
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, MtlMode, Warnings};
 use crate::math::Vec3;
-use crate::scene::{AlphaMode, Coat, Grain, Material, MetalRough, Phong, Reflection, Sheen};
+use crate::scene::{AlphaMode, Anisotropy, Coat, Material, MetalRough, Phong, Reflection, Sheen};
 use std::path::Path;
 
 /// Diffuse colour of a material that gives none: that of [`Material::plain`].
@@ -356,7 +356,7 @@ impl Meaning<'_> {
             thick: glass,
             sheen: self.sheen().map(Box::new),
             coat: self.coat().map(Box::new),
-            grain: self.grain().map(Box::new),
+            anisotropy: self.anisotropy().map(Box::new),
             ..MetalRough::default()
         }
     }
@@ -385,11 +385,11 @@ impl Meaning<'_> {
     }
 
     /// `aniso`, `anisor`.
-    fn grain(&self) -> Option<Grain> {
+    fn anisotropy(&self) -> Option<Anisotropy> {
         // A map of turns has them in its picture.
         let turns = self.mtl.anisor.filter(|_| !(self.has_map)(Slot::GrainTurn));
         let rotation = turns.map_or(0.0, |turns| number(turns.rem_euclid(1.0) * std::f64::consts::TAU));
-        Some(Grain { strength: self.share_under(Slot::Grain, self.mtl.aniso)?, rotation, map: None })
+        Some(Anisotropy { strength: self.share_under(Slot::Anisotropy, self.mtl.aniso)?, rotation, map: None })
     }
 
     /// The share that a map is multiplied by: all where no number is given, or a careless 0.

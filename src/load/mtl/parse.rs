@@ -64,7 +64,7 @@ pub(super) enum Slot {
     Sheen,
     Coat,
     CoatRoughness,
-    Grain,
+    Anisotropy,
     GrainTurn,
 }
 
@@ -100,7 +100,7 @@ const MAPS: [(&[u8], Slot); 32] = [
     (b"map_ps", Slot::Sheen),
     (b"map_pc", Slot::Coat),
     (b"map_pcr", Slot::CoatRoughness),
-    (b"map_aniso", Slot::Grain),
+    (b"map_aniso", Slot::Anisotropy),
     (b"map_anisor", Slot::GrainTurn),
 ];
 
@@ -157,7 +157,7 @@ impl Mtl {
             Slot::Sheen,
             Slot::Coat,
             Slot::CoatRoughness,
-            Slot::Grain,
+            Slot::Anisotropy,
             Slot::GrainTurn,
         ];
         [self.pr, self.pm, self.ps, self.pc, self.pcr, self.aniso, self.anisor].iter().any(Option::is_some)

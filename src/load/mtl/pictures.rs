@@ -27,7 +27,7 @@ pub(super) enum Take {
     Coded(usize, Channel),
     /// Strength of a grain in blue, and in red and green its direction, by how often it is turned: a channel times the
     /// number whose bits these are. 1 and not at all where there is none.
-    Grain(Option<(usize, Channel)>, Option<(usize, Channel)>, u64),
+    Anisotropy(Option<(usize, Channel)>, Option<(usize, Channel)>, u64),
 }
 
 /// How a picture uses its alpha channel.
@@ -81,7 +81,7 @@ impl Pictures {
             Take::Inverse(i, channel) => Made::New(self.map(i, |p| grey(1.0 - pick(p, channel)))),
             Take::RoughMetal(rough, metal) => Made::New(self.rough_metal(rough, metal)),
             Take::Coded(i, channel) => Made::New(self.coded(i, channel)),
-            Take::Grain(strength, turn, most) => Made::New(self.grain(strength, turn, f64::from_bits(most))),
+            Take::Anisotropy(strength, turn, most) => Made::New(self.anisotropy(strength, turn, f64::from_bits(most))),
         };
         #[expect(clippy::cast_possible_truncation, reason = "a handful of pictures for each material")]
         let index = self.made.len() as u32;
@@ -101,7 +101,7 @@ impl Pictures {
             }
             Take::RoughMetal(rough, metal) => Some((self.size_of_pair([rough, metal]), 4)),
             Take::Coded(i, _) => Some((size(i), 8)),
-            Take::Grain(strength, turn, _) => Some((self.size_of_pair([strength, turn]), 8)),
+            Take::Anisotropy(strength, turn, _) => Some((self.size_of_pair([strength, turn]), 8)),
         }
     }
 
@@ -111,7 +111,7 @@ impl Pictures {
             Take::Whole(i) | Take::Opaque(i) | Take::Channel(i, _) | Take::Inverse(i, _) | Take::Coded(i, _) => {
                 self.sources[i].name.clone()
             }
-            Take::RoughMetal(first, second) | Take::Grain(first, second, _) => self.name_of_pair([first, second]),
+            Take::RoughMetal(first, second) | Take::Anisotropy(first, second, _) => self.name_of_pair([first, second]),
         }
     }
 
@@ -183,7 +183,7 @@ impl Pictures {
     }
 
     /// In sixteen bits, so that a grain that is not turned is not turned.
-    fn grain(&self, strength: Option<(usize, Channel)>, turn: Option<(usize, Channel)>, most: f64) -> Bitmap {
+    fn anisotropy(&self, strength: Option<(usize, Channel)>, turn: Option<(usize, Channel)>, most: f64) -> Bitmap {
         #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
         let texel = |[strength, turn]: [Option<f32>; 2]| {
             let (sin, cos) = libm::sincos(f64::from(turn.unwrap_or(0.0)) * most * std::f64::consts::TAU);
@@ -340,8 +340,11 @@ mod tests {
     fn numbers_are_read_back_from_where_colours_and_directions_are() {
         let mut p = pictures(&[(2, 1, &[[51, 0, 0, 0], [128, 0, 0, 0]])]);
         let (red, quarter) = (Some((0, Channel::Red)), 0.25f64.to_bits());
-        let takes =
-            [Take::Coded(0, Channel::Red), Take::Grain(red, None, quarter), Take::Grain(None, red, 5f64.to_bits())];
+        let takes = [
+            Take::Coded(0, Channel::Red),
+            Take::Anisotropy(red, None, quarter),
+            Take::Anisotropy(None, red, 5f64.to_bits()),
+        ];
         for take in takes {
             make(&mut p, take);
         }
@@ -368,10 +371,13 @@ mod tests {
         let over = p.take(Take::RoughMetal(row, column), &small, &mut budget).unwrap_err();
         assert!(over.why.contains("3000×3000 pixels"), "{}", over.why);
         assert!(p.take(Take::RoughMetal(row, column), &Limits::default(), &mut budget).is_ok());
-        assert_eq!((budget.left(), p.name(Take::Grain(row, column, 0)).as_str()), (0, "p + p"));
-        for take in
-            [Take::Opaque(0), Take::Coded(0, Channel::Red), Take::Grain(row, None, 0), Take::Inverse(0, Channel::Red)]
-        {
+        assert_eq!((budget.left(), p.name(Take::Anisotropy(row, column, 0)).as_str()), (0, "p + p"));
+        for take in [
+            Take::Opaque(0),
+            Take::Coded(0, Channel::Red),
+            Take::Anisotropy(row, None, 0),
+            Take::Inverse(0, Channel::Red),
+        ] {
             assert!(p.take(take, &Limits::default(), &mut budget).is_err(), "{take:?}");
         }
         // What is there already costs nothing.

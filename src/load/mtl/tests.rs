@@ -180,24 +180,25 @@ fn roughness_and_metal_maps_share_one_texture() {
 }
 
 #[test]
-fn maps_of_sheen_lacquer_and_grain_are_drawn_and_zeros_under_them_count_as_1() {
+fn maps_of_sheen_coat_and_grain_are_drawn_and_zeros_under_them_count_as_1() {
     let maps = "map_Ps s.png\nmap_Pc -imfchan g c.png\nmap_Pcr c.png\nmap_aniso a.png\nmap_anisor t.png\n";
     let mtl = format!("newmtl a\nKd 1 1 1\nPr 0.5\nPs 0\nPc 0.5\naniso 0\nanisor 0\n{maps}");
     let files = [("s.png", [90; 4]), ("c.png", [20, 60, 20, 255]), ("a.png", [51; 4]), ("t.png", [255; 4])];
     let (loaded, m) = guess(&mtl, &files);
     assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
     let Reflection::MetalRough(s) = &m.reflection else { panic!("physically based") };
-    let (sheen, coat, grain) = (s.sheen.as_ref().unwrap(), s.coat.as_ref().unwrap(), s.grain.as_ref().unwrap());
+    let (sheen, coat, anisotropy) =
+        (s.sheen.as_ref().unwrap(), s.coat.as_ref().unwrap(), s.anisotropy.as_ref().unwrap());
     assert_eq!((sheen.color, coat.strength, coat.roughness), (Vec3::ONE, 0.5, 1.0));
-    assert_eq!((grain.strength, grain.rotation), (1.0, 0.0));
+    assert_eq!((anisotropy.strength, anisotropy.rotation), (1.0, 0.0));
     assert_eq!(texel(&loaded, coat.strength_map.as_ref())[0], 60);
     assert_eq!(texel(&loaded, coat.roughness_map.as_ref())[1], 49, "brightness");
-    assert!(sheen.color_map.is_some() && grain.map.is_some());
+    assert!(sheen.color_map.is_some() && anisotropy.map.is_some());
 
     let (_, plain) = guess("newmtl a\nKd 1 1 1\nPc 1\naniso 0.5\nmap_Pc 0\nmap_aniso none.png", &[]);
     let Reflection::MetalRough(s) = &plain.reflection else { panic!("physically based") };
-    assert!(s.coat.as_ref().unwrap().strength_map.is_none() && s.grain.as_ref().unwrap().map.is_none());
-    assert_eq!(s.grain.as_ref().unwrap().strength, 0.5, "a map that is not there changes nothing");
+    assert!(s.coat.as_ref().unwrap().strength_map.is_none() && s.anisotropy.as_ref().unwrap().map.is_none());
+    assert_eq!(s.anisotropy.as_ref().unwrap().strength, 0.5, "a map that is not there changes nothing");
 }
 
 #[test]

@@ -366,7 +366,7 @@ impl Mapper<'_> {
         material.bump_map = self.texture(take, &map);
     }
 
-    /// Maps of sheen, lacquer and grain.
+    /// Maps of sheen, clear coat and grain.
     fn lobes(&mut self, m: &mut MetalRough) {
         if let Some(sheen) = &mut m.sheen {
             let named = self.picture(Slot::Sheen).map(|(map, picture)| (map.clone(), picture));
@@ -379,18 +379,18 @@ impl Mapper<'_> {
             coat.strength_map = self.scalar(Slot::Coat);
             coat.roughness_map = self.scalar(Slot::CoatRoughness);
         }
-        if let Some(grain) = &mut m.grain {
-            grain.map = self.grain();
+        if let Some(anisotropy) = &mut m.anisotropy {
+            anisotropy.map = self.anisotropy();
         }
     }
 
     /// Strength and direction of a grain in one texture; both go by the options of the first there is.
-    fn grain(&mut self) -> Option<TextureRef> {
+    fn anisotropy(&mut self) -> Option<TextureRef> {
         let channel = |(map, picture): (&Map, usize)| (picture, map.channel.unwrap_or(Channel::Luminance));
-        let (strength, turn) = (self.picture(Slot::Grain), self.picture(Slot::GrainTurn));
+        let (strength, turn) = (self.picture(Slot::Anisotropy), self.picture(Slot::GrainTurn));
         let map = strength.or(turn)?.0.clone();
         let most = self.mtl.anisor.filter(|turns| *turns != 0.0 || self.mode == MtlMode::Literal).unwrap_or(1.0);
-        let take = Take::Grain(strength.map(channel), turn.map(channel), most.to_bits());
+        let take = Take::Anisotropy(strength.map(channel), turn.map(channel), most.to_bits());
         self.texture(take, &map)
     }
 

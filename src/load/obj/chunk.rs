@@ -6,7 +6,7 @@
 //! them) and read in one pass over their bytes; everything else goes word by word.
 
 use super::statements::Oddities;
-use crate::load::geometry::{Face, LARGEST, Run, Stretch, Stroke};
+use crate::load::geometry::{Face, FaceSpan, LARGEST, Run, WireStatement};
 use crate::load::number::{self, Plain};
 use crate::load::text::encoding::decode_name;
 use crate::load::text::lines::{Lines, keyword, without_comment, words};
@@ -44,9 +44,9 @@ pub(super) struct Chunk {
     pub corners: Corners,
     /// Corners of faces that have too few.
     pub dropped: Vec<[u32; 3]>,
-    pub faces: Vec<Stretch>,
+    pub faces: Vec<FaceSpan>,
     /// Points and lines.
-    pub strokes: Vec<Stroke>,
+    pub strokes: Vec<WireStatement>,
     /// Their corners, as [`Self::corners`].
     pub stroke_corners: Vec<[u32; 3]>,
     pub runs: Vec<Run>,
@@ -495,7 +495,7 @@ impl Reader {
             return self.out.odd.strokes.note(self.line, rest);
         }
         let run = self.run();
-        self.out.strokes.push(Stroke { run, line: self.line, arity, joined });
+        self.out.strokes.push(WireStatement { run, line: self.line, arity, joined });
     }
 
     /// `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, or back from the last one with −1. Some programs write 0
@@ -549,7 +549,7 @@ impl Reader {
         let face = Face { run, smoothing: self.out.smoothing, arity, line, number, first };
         match self.out.faces.last_mut() {
             Some(stretch) if stretch.face(stretch.count) == face => stretch.count += 1,
-            _ => self.out.faces.push(Stretch { face, count: 1 }),
+            _ => self.out.faces.push(FaceSpan { face, count: 1 }),
         }
         self.out.face_count = self.out.face_count.saturating_add(1);
     }

@@ -2,7 +2,7 @@
 
 use super::chunk::{COMMENTS, Chunk, NO_COLOR, OPEN, count, resolve};
 use super::statements::Statements;
-use crate::load::geometry::{Corner, Geometry, LARGEST, NONE, Run, Soup, Stretch, Stroke};
+use crate::load::geometry::{Corner, FaceSpan, Geometry, LARGEST, NONE, Run, Soup, WireStatement};
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::parts::{cut, joined};
 use rayon::prelude::*;
@@ -58,17 +58,17 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
     out.geometry = Geometry { soup, names: table.names, runs: table.runs, ..out.geometry };
     match plain {
         Some(triangles) => (out.geometry.triangles, out.geometry.stretches) = (triangles, stretches),
-        None => out.geometry.faces = Stretch::all(&stretches),
+        None => out.geometry.faces = FaceSpan::all(&stretches),
     }
     Ok(Joined { statements: out, faulty })
 }
 
 /// The faces of all runs of lines, as the whole numbers them.
-fn stretches(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<Stretch> {
-    let mut all: Vec<Stretch> = Vec::with_capacity(chunks.iter().map(|chunk| chunk.faces.len()).sum());
+fn stretches(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<FaceSpan> {
+    let mut all: Vec<FaceSpan> = Vec::with_capacity(chunks.iter().map(|chunk| chunk.faces.len()).sum());
     let mut first = 0;
     for ((chunk, before), runs) in chunks.iter().zip(begins).zip(runs) {
-        for &Stretch { mut face, count: faces } in &chunk.faces {
+        for &FaceSpan { mut face, count: faces } in &chunk.faces {
             face.first += first;
             face.run = runs[face.run as usize];
             face.line = face.line.saturating_add(before.lines);
@@ -76,7 +76,7 @@ fn stretches(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<Stre
             face.smoothing = if face.smoothing == OPEN { before.smoothing } else { face.smoothing };
             match all.last_mut() {
                 Some(last) if last.face(last.count) == face => last.count += faces,
-                _ => all.push(Stretch { face, count: faces }),
+                _ => all.push(FaceSpan { face, count: faces }),
             }
         }
         first += count(chunk.corners.len());
@@ -86,8 +86,8 @@ fn stretches(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<Stre
 
 /// The vertices of triangles, of so many, where there is nothing else and nothing more is said of them; `None` too where one is
 /// not there.
-fn triangles(chunks: &[Chunk], begins: &[Before], vertices: u32, stretches: &[Stretch]) -> Option<Vec<[u32; 3]>> {
-    let is_plain = |stretch: &Stretch| (stretch.face.arity, stretch.face.smoothing) == (3, 0);
+fn triangles(chunks: &[Chunk], begins: &[Before], vertices: u32, stretches: &[FaceSpan]) -> Option<Vec<[u32; 3]>> {
+    let is_plain = |stretch: &FaceSpan| (stretch.face.arity, stretch.face.smoothing) == (3, 0);
     let of_faces = |chunk: &Chunk| chunk.strokes.is_empty() && chunk.dropped.is_empty() && !chunk.faulty;
     let faces: u64 = chunks.iter().map(|chunk| u64::from(chunk.face_count)).sum();
     let drawn: u64 = stretches.iter().map(|stretch| u64::from(stretch.count)).sum();
@@ -272,7 +272,7 @@ fn strokes(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>], there: &There
                 corners.truncate(first);
                 out.odd.strokes.note(line, if stroke.joined { b"l" } else { b"p" });
             } else {
-                out.geometry.strokes.push(Stroke { run: runs[stroke.run as usize], line, ..*stroke });
+                out.geometry.strokes.push(WireStatement { run: runs[stroke.run as usize], line, ..*stroke });
             }
         }
     }

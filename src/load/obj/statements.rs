@@ -8,7 +8,7 @@
 use super::chunk::{self, Chunk};
 use super::join::{Joined, join};
 use super::{faults, split};
-use crate::load::geometry::{Geometry, LARGEST, Run, Stretch};
+use crate::load::geometry::{FaceSpan, Geometry, LARGEST, Run};
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::text::encoding::decode_name;
 use crate::load::wires::Wires;
@@ -143,7 +143,7 @@ fn bytes(chunk: &Chunk) -> u64 {
     /// A face, and its number in the mesh.
     const FACE: u64 = 24 + 4;
     /// Twice: in the run of lines and in the whole.
-    const STRETCH: u64 = 2 * size_of::<Stretch>() as u64;
+    const STRETCH: u64 = 2 * size_of::<FaceSpan>() as u64;
     /// Numbers, indices, those of the mesh, and their vertex.
     const CORNER: u64 = 12 + 12 + 12 + 16;
     /// Twice in `f64`, then in `f32`, and in the mesh.
@@ -240,7 +240,7 @@ impl Oddities {
 mod tests {
     use super::*;
     use crate::load::Limits;
-    use crate::load::geometry::{Face, NONE, Stroke, color};
+    use crate::load::geometry::{Face, NONE, WireStatement, color};
     use crate::math::{DVec2, DVec3, Vec3};
 
     fn read_with(text: &str, memory: u64) -> Result<Statements, LoadError> {
@@ -367,7 +367,7 @@ mod tests {
     fn points_and_lines_name_vertices_like_faces_and_bad_ones_are_left_out() {
         let text = format!("l 1/1 2 3 # side\n{TRIANGLE}vt 0 0\np -1 1\nl 1\nl 1 9\np x\np\nl 1 -4\nf 1 2 3\nl 2 3");
         let s = of(&text);
-        let stroke = |line, arity, joined| Stroke { run: 0, line, arity, joined };
+        let stroke = |line, arity, joined| WireStatement { run: 0, line, arity, joined };
         assert_eq!(s.geometry.strokes, [stroke(1, 3, true), stroke(6, 2, false), stroke(13, 2, true)]);
         let numbers: Vec<_> = s.geometry.soup.stroke_corners.iter().map(|c| (c.position, c.uv == NONE)).collect();
         let at = |i| (i, true);

@@ -10,7 +10,7 @@ use super::packed::Record;
 use super::told::passed_over;
 use crate::load::diagnostic::DAMAGED;
 use crate::load::geometry::NONE;
-use crate::load::geometry::bare::{Bare, Said};
+use crate::load::geometry::plain_mesh::{PlainMesh, Said};
 use crate::load::limits::Budget;
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, Source};
@@ -21,13 +21,13 @@ use std::path::Path;
 ///
 /// # Errors
 /// At the first value that is missing or makes no sense, or when memory would exceed the budget.
-pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Result<Bare, Diagnostic> {
+pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Result<PlainMesh, Diagnostic> {
     let body = Body::new(header, source);
     let vertices = header.element("vertex").map_or(0, |element| element.count);
     // Each name is kept here, in the header and as that of a material, and stands in paths.
     let names: usize = header.pictures.iter().map(|(_, name)| name.len()).sum();
     budget.take(names as u64, 4).map_err(|over| Diagnostic::over_budget(&source.path, over))?;
-    let (wanted, bare) = (Wanted::of(header), Bare::showing(header.pictures.clone()));
+    let (wanted, bare) = (Wanted::of(header), PlainMesh::showing(header.pictures.clone()));
     let mut reader = Reader { source, body, vertices, wanted, budget, bare, torn: None, odd: Odd::default() };
     for element in &header.elements {
         if let Err(fault) = reader.element(element) {
@@ -55,7 +55,7 @@ struct Reader<'a, 'b> {
     vertices: u64,
     wanted: Wanted,
     budget: &'b mut Budget,
-    bare: Bare,
+    bare: PlainMesh,
     /// A line that has not the numbers of one row.
     torn: Option<Diagnostic>,
     odd: Odd,
@@ -146,8 +146,8 @@ impl Reader<'_, '_> {
     }
 
     fn vertices(&mut self, element: &Element) -> Result<(), Diagnostic> {
-        if element.count > Bare::LARGEST {
-            let text = format!("{} vertices are more than {}", element.count, Bare::LARGEST);
+        if element.count > PlainMesh::LARGEST {
+            let text = format!("{} vertices are more than {}", element.count, PlainMesh::LARGEST);
             return Err(self.body.fault(text, "split the file"));
         }
         let slots = Meanings::of(element).slots;
@@ -156,7 +156,7 @@ impl Reader<'_, '_> {
             return Err(self.body.fault("vertices have no x, y and z", "export it again"));
         }
         let (has_normals, has_uvs, has_colors) = (has(&NORMAL), has(&UV), has(&COLOR));
-        Bare::charge_vertices(self.budget, element.count)
+        PlainMesh::charge_vertices(self.budget, element.count)
             .map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
 
         if self.packed_vertices(element, &slots, [has_normals, has_uvs, has_colors]) {
@@ -268,7 +268,8 @@ impl Reader<'_, '_> {
                 }
             }
             // An edge takes what a face of two corners would.
-            Bare::charge_faces(self.budget, 1, 2).map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
+            PlainMesh::charge_faces(self.budget, 1, 2)
+                .map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
             self.bare.edge(edge, color);
         }
         Ok(())
@@ -319,10 +320,10 @@ impl Reader<'_, '_> {
         let is_there = |corner: f64| corner >= 0.0 && corner < vertices && corner.fract() == 0.0;
         let is_sound = |row: Record| row.value(start, length) == 3.0 && corners(row).into_iter().all(is_there);
         let most = (self.bare.corners.len() as u64).saturating_add(element.count.saturating_mul(3));
-        if most > Bare::LARGEST || !rows.all(is_sound) {
+        if most > PlainMesh::LARGEST || !rows.all(is_sound) {
             return Ok(false);
         }
-        Bare::charge_faces(self.budget, element.count, 3)
+        PlainMesh::charge_faces(self.budget, element.count, 3)
             .map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
         #[expect(
             clippy::cast_possible_truncation,
@@ -381,7 +382,7 @@ impl Reader<'_, '_> {
         if length * self.body.least(property.kind) > self.body.left() {
             return Err(self.missing(&Missing::End, element, i, property));
         }
-        self.take(length, Bare::CORNER_UV / 2)?;
+        self.take(length, PlainMesh::CORNER_UV / 2)?;
         uvs.clear();
         for _ in 0..length {
             uvs.push(self.value(element, i, property)?);
@@ -392,7 +393,7 @@ impl Reader<'_, '_> {
     /// Asks for the memory of the colours of so many faces or edges, if they have some.
     fn take_colors(&mut self, count: u64, uses: &[Use]) -> Result<(), Diagnostic> {
         let is_colored = uses.iter().any(|used| matches!(used, Use::Light(_)));
-        self.take(if is_colored { count } else { 0 }, Bare::COLOR)
+        self.take(if is_colored { count } else { 0 }, PlainMesh::COLOR)
     }
 
     fn take(&mut self, count: u64, bytes: u64) -> Result<(), Diagnostic> {
@@ -448,7 +449,7 @@ impl Reader<'_, '_> {
         let granted = if strips {
             for_now.take(length, size_of::<u32>() as u64)
         } else {
-            Bare::charge_faces(self.budget, 1, length)
+            PlainMesh::charge_faces(self.budget, 1, length)
         };
         granted.map_err(|over| Diagnostic::over_budget(&self.source.path, over))
     }
@@ -477,10 +478,10 @@ impl Reader<'_, '_> {
             // Two equal corners only turn the strip.
             if a != b && b != c && c != a {
                 let [a, b] = if i % 2 == 0 { [a, b] } else { [b, a] };
-                Bare::charge_faces(self.budget, 1, 3)
+                PlainMesh::charge_faces(self.budget, 1, 3)
                     .map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
                 if color.is_some() {
-                    self.take(1, Bare::COLOR)?;
+                    self.take(1, PlainMesh::COLOR)?;
                 }
                 self.face(&[a, b, c], &Said { color, ..Said::default() })?;
             }
@@ -491,8 +492,8 @@ impl Reader<'_, '_> {
     /// Adds a face whose memory was granted.
     fn face(&mut self, corners: &[u32], said: &Said) -> Result<(), Diagnostic> {
         let most = self.bare.corners.len().max(self.bare.arities.len()) as u64 + corners.len() as u64;
-        if most > Bare::LARGEST {
-            let text = format!("more than {} faces or corners", Bare::LARGEST);
+        if most > PlainMesh::LARGEST {
+            let text = format!("more than {} faces or corners", PlainMesh::LARGEST);
             return Err(self.body.fault(text, "split the file"));
         }
         self.bare.face(corners, said);

@@ -22,7 +22,7 @@ mod meaning;
 mod packed;
 mod told;
 
-use super::geometry::bare;
+use super::geometry::plain_mesh;
 use super::limits::Budget;
 use super::{LoadError, LoadOptions, Loaded, Source};
 use crate::scene::UpAxis;
@@ -42,7 +42,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
         Encoding::BigEndian => "PLY (binary, big-endian)",
     };
     let otherwise = (UpAxis::Y, "PLY does not say, and nothing speaks for +Z");
-    bare::load(bare, format, otherwise, source, options, budget)
+    plain_mesh::load(bare, format, otherwise, source, options, budget)
 }
 
 #[cfg(test)]

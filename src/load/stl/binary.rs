@@ -2,7 +2,7 @@
 
 use super::Making;
 use crate::load::diagnostic::CUT_OFF;
-use crate::load::geometry::bare::Bare;
+use crate::load::geometry::plain_mesh::PlainMesh;
 use crate::load::{Diagnostic, Source};
 use crate::math::DVec3;
 use crate::scene::Material;
@@ -31,7 +31,7 @@ pub(in crate::load) fn is_exact(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// When there are fewer than the header claims. What follows them is not looked at; a warning counts it.
-pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnostic> {
+pub(super) fn read(source: &Source, mut making: Making) -> Result<PlainMesh, Diagnostic> {
     let bytes = source.bytes.as_slice();
     let fault = |at: usize, text: String| {
         let fault = Diagnostic::new("stl-cut-off", &source.path, format!("byte {at}"), text);

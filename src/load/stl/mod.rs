@@ -11,7 +11,7 @@ mod binary;
 mod text;
 mod weld;
 
-use super::geometry::bare::{self, Bare};
+use super::geometry::plain_mesh::{self, PlainMesh};
 use super::limits::Budget;
 use super::{Diagnostic, LoadError, LoadOptions, Loaded, Source};
 use crate::math::DVec3;
@@ -50,7 +50,7 @@ pub fn load(
     };
     // Layers are built upwards along z.
     let otherwise = (UpAxis::Z, "STL does not say; what is made to be printed stands on the xy plane");
-    bare::load(bare, format, otherwise, source, options, budget)
+    plain_mesh::load(bare, format, otherwise, source, options, budget)
 }
 
 /// What the memory comes out of that triangles are made with.
@@ -64,13 +64,13 @@ struct Making<'a> {
 impl Making<'_> {
     /// Takes the memory of so many triangles, before they are made.
     fn take(&mut self, triangles: usize) -> Result<(), Diagnostic> {
-        let taken = Bare::charge_faces(self.budget, triangles as u64, 3);
+        let taken = PlainMesh::charge_faces(self.budget, triangles as u64, 3);
         taken.map_err(|over| Diagnostic::over_budget(self.file, over))
     }
 
     /// The same of their colours.
     fn take_colors(&mut self, triangles: usize) -> Result<(), Diagnostic> {
-        let taken = self.budget.take(triangles as u64, Bare::COLOR);
+        let taken = self.budget.take(triangles as u64, PlainMesh::COLOR);
         taken.map_err(|over| Diagnostic::over_budget(self.file, over))
     }
 
@@ -92,7 +92,7 @@ impl Making<'_> {
         place: impl Fn(usize) -> DVec3 + Sync,
         bits: impl Fn(DVec3) -> P + Sync,
         colors: Vec<[f32; 4]>,
-    ) -> Result<Bare, Diagnostic> {
+    ) -> Result<PlainMesh, Diagnostic> {
         self.hold(corners, weld::cost::<P>())?;
         if corners > weld::LARGEST {
             let text = format!("more than {} corners", weld::LARGEST);
@@ -100,10 +100,10 @@ impl Making<'_> {
         }
         // Adding 0 makes one zero of two.
         let Welded { firsts, vertices } = weld(corners, |corner| bits(place(corner) + DVec3::ZERO));
-        Bare::charge_vertices(self.budget, firsts.len() as u64)
+        PlainMesh::charge_vertices(self.budget, firsts.len() as u64)
             .map_err(|over| Diagnostic::over_budget(self.file, over))?;
         let positions = firsts.par_iter().map(|&corner| place(corner as usize)).collect();
-        Ok(Bare::of_triangles(positions, vertices, colors))
+        Ok(PlainMesh::of_triangles(positions, vertices, colors))
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::Making;
 use crate::load::diagnostic::{CUT_OFF, DAMAGED};
-use crate::load::geometry::bare::Bare;
+use crate::load::geometry::plain_mesh::PlainMesh;
 use crate::load::paths::shorten;
 use crate::load::text::{without_mark, words};
 use crate::load::{Diagnostic, Source};
@@ -21,7 +21,7 @@ const FACET: u64 = 3 * 3 * size_of::<DVec3>() as u64;
 /// # Errors
 /// At the first word that is out of place, with its line; colours never are. A solid without its end may be whole all the
 /// same; a warning says so.
-pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnostic> {
+pub(super) fn read(source: &Source, mut making: Making) -> Result<PlainMesh, Diagnostic> {
     // Zeros fill the last block of what was copied in blocks.
     let length = source.bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
     let bytes = without_mark(&source.bytes[..length]);

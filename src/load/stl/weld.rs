@@ -4,7 +4,7 @@
 //! side: a table for all would miss the cache at nearly every corner. The hash has a seed of its own in each run, so that no
 //! file can be made whose places meet in one slot; numbers do not depend on it.
 
-use crate::load::geometry::bare::Bare;
+use crate::load::geometry::plain_mesh::PlainMesh;
 use bytemuck::Pod;
 use rayon::prelude::*;
 use std::hash::{BuildHasher, RandomState};
@@ -23,7 +23,7 @@ pub(super) struct Welded {
 }
 
 /// The most corners.
-pub(super) const LARGEST: usize = Bare::LARGEST as usize;
+pub(super) const LARGEST: usize = PlainMesh::LARGEST as usize;
 
 /// Marks the number of a vertex at the corner where it is first met; without it a number is that of such a corner.
 const FIRST: u32 = 1 << 31;

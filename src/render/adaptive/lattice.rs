@@ -1,8 +1,8 @@
 //! The lattice of points that all pixels share, and what was found at those of one tile.
 
-use crate::render::eyes::Place;
 use crate::render::frame::{Frame, on_lens, pixel_key};
 use crate::render::layers::FirstSurface;
+use crate::render::primary_rays::Place;
 use crate::render::sampling::Adaptive;
 use crate::render::whitted::Sample;
 use std::collections::HashMap;

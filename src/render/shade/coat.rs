@@ -1,4 +1,4 @@
-//! Lacquer: a clear dielectric layer over whatever a surface is (KHR_materials_clearcoat).
+//! Clear coat: a clear dielectric layer over whatever a surface is (KHR_materials_clearcoat).
 //!
 //! What the layer reflects, by the same microfacet model as the surface under it, is taken off what comes from below; light
 //! is not bent on its way through. The share that is taken off is that of the view alone, as the extension says.
@@ -6,7 +6,7 @@
 use super::facets::albedo;
 use super::highlight::{highlight, is_narrow, least_square, squared_width};
 use super::metal_rough::{above, open, traced};
-use super::{Reader, Seen, Sky};
+use super::{Reader, ShadingFrame, Sky};
 use crate::math::Vec3;
 use crate::render::optics::{fresnel_schlick, reflect};
 use crate::scene::Coat;
@@ -14,9 +14,9 @@ use crate::scene::Coat;
 /// Reflectance of a boundary to index 1.5, face on.
 const F0: f32 = 0.04;
 
-/// The lacquer at one point.
+/// The clear coat at one point.
 #[derive(Clone, Debug)]
-pub(crate) struct CoatMatter {
+pub(crate) struct CoatLobe {
     /// Share of the surface that it covers.
     pub strength: f32,
     pub roughness: f32,
@@ -32,7 +32,7 @@ pub(crate) struct CoatMatter {
     pub least_square: f32,
 }
 
-impl CoatMatter {
+impl CoatLobe {
     /// What covers nothing.
     pub(crate) const NONE: Self = Self {
         strength: 0.0,
@@ -44,7 +44,7 @@ impl CoatMatter {
         least_square: 0.0,
     };
 
-    /// `None` where it covers nothing; `normal` is that of the lacquer.
+    /// `None` where it covers nothing; `normal` is that of the clear coat.
     pub(super) fn new(coat: &Coat, normal: Vec3, view: Vec3, occlusion: f32, reader: &Reader) -> Option<Self> {
         let strength = (coat.strength * reader.linear(coat.strength_map.as_ref()).x).clamp(0.0, 1.0);
         let roughness = (coat.roughness * reader.linear(coat.roughness_map.as_ref()).y).clamp(0.0, 1.0);
@@ -92,7 +92,7 @@ impl CoatMatter {
     }
 
     /// What it shows of the surroundings without a ray.
-    pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
+    pub(super) fn ambient(&self, seen: &ShadingFrame, sky: &Sky, ambient: Vec3) -> Vec3 {
         if self.looked_up() <= 0.0 {
             return Vec3::ZERO;
         }
@@ -108,7 +108,7 @@ impl CoatMatter {
 
     /// Where that is looked for.
     #[inline(always)]
-    pub(crate) fn mirrored_from(&self, seen: &Seen) -> Vec3 {
+    pub(crate) fn mirrored_from(&self, seen: &ShadingFrame) -> Vec3 {
         above(reflect(-seen.view, self.normal), seen.geometric)
     }
 
@@ -137,13 +137,13 @@ mod tests {
     use crate::render::texture::TextureStore;
     use crate::scene::Scene;
 
-    fn coat(strength: f32, roughness: f32, view: Vec3) -> Option<CoatMatter> {
+    fn coat(strength: f32, roughness: f32, view: Vec3) -> Option<CoatLobe> {
         let coat =
             Coat { strength, strength_map: None, roughness, roughness_map: None, normal_map: None, normal_scale: 1.0 };
         let scene = Scene::default();
         let store = TextureStore::new(&scene);
         let reader = Reader { store: &store, patch: None, known: &[] };
-        CoatMatter::new(&coat, Vec3::Z, view, 1.0, &reader)
+        CoatLobe::new(&coat, Vec3::Z, view, 1.0, &reader)
     }
 
     fn at(degrees: f32) -> Vec3 {
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn lacquer_takes_off_what_it_mirrors() {
+    fn coat_takes_off_what_it_mirrors() {
         for degrees in [0.0, 30.0, 60.0, 85.0] {
             let smooth = coat(1.0, 0.0, at(degrees)).unwrap();
             assert!((smooth.mirrored() + smooth.clear() - 1.0).abs() < 1e-6);
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn rough_lacquer_sends_no_ray_and_shows_a_wide_highlight() {
+    fn rough_coat_sends_no_ray_and_shows_a_wide_highlight() {
         let (smooth, rough) = (coat(1.0, 0.1, Vec3::Z).unwrap(), coat(1.0, 0.6, Vec3::Z).unwrap());
         assert_eq!(rough.mirrored(), 0.0);
         assert!(smooth.lit(Vec3::Z, Vec3::Z) > 100.0 * rough.lit(Vec3::Z, Vec3::Z));
@@ -173,13 +173,13 @@ mod tests {
     }
 
     #[test]
-    fn a_white_sky_gives_back_no_more_than_the_share_of_the_lacquer() {
+    fn a_white_sky_gives_back_no_more_than_the_share_of_the_coat() {
         let sky = Sky::new(&Scene { environment: crate::scene::Environment::Constant(Vec3::ONE), ..Scene::default() });
         for roughness in [0.15, 0.3, 0.7, 1.0] {
             for degrees in [0.0, 45.0, 75.0] {
                 let view = at(degrees);
                 let coat = coat(1.0, roughness, view).unwrap();
-                let seen = Seen { normal: Vec3::Z, geometric: Vec3::Z, view, outside: true };
+                let seen = ShadingFrame { normal: Vec3::Z, geometric: Vec3::Z, view, outside: true };
                 let white = coat.ambient(&seen, &sky, Vec3::ZERO).x + coat.mirrored();
                 assert!(white > 0.01 && white <= coat.taken + 0.02, "{roughness} at {degrees}: {white}");
             }

@@ -115,14 +115,14 @@ impl LocalLight {
     }
 
     /// Whether it is seen as many points.
-    pub(crate) fn is_wide(&self) -> bool {
+    pub(crate) fn is_area(&self) -> bool {
         self.size > 0.0 || matches!(self.shape, Shape::Rectangle { .. })
     }
 
     /// What arrives from one point of it, which is wide, drawn with two numbers from 0 … 1, as if all of it shone from there;
     /// the mean of many is what arrives from the whole. `None` where nothing does.
     pub(crate) fn incident_from(&self, position: Vec3, at: [f32; 2]) -> Option<Incident> {
-        debug_assert!(self.is_wide());
+        debug_assert!(self.is_area());
         let (incident, arrives) = self.arriving_from(position, at);
         arrives.then_some(incident)
     }

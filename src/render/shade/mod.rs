@@ -1,14 +1,14 @@
 //! What a surface does with light: the material at a point, evaluated from factors, maps and vertex colours.
 //!
-//! Shading models answer two questions here: how a light's arrival is seen ([`Matter::lit`], [`Matter::lit_through`]),
-//! and how much of what lies in the mirrored and refracted direction is seen ([`Matter::balance`]). Which rays are
+//! Shading models answer two questions here: how a light's arrival is seen ([`Bsdf::lit`], [`Bsdf::lit_through`]),
+//! and how much of what lies in the mirrored and refracted direction is seen ([`Bsdf::bounce_weights`]). Which rays are
 //! sent, and what they find, is the tracer's business.
 
+mod anisotropy;
 mod coat;
 mod facets;
-mod film;
-mod grain;
 mod highlight;
+mod iridescence;
 mod light;
 mod lobe;
 mod metal_rough;
@@ -16,18 +16,18 @@ mod phong;
 mod sheen;
 mod spectrum;
 
-pub(crate) use coat::CoatMatter;
+pub(crate) use anisotropy::AnisotropicLobe;
+pub(crate) use coat::CoatLobe;
 pub(crate) use facets::{AlbedoRow, albedo_of_each, mean_albedo};
-pub(crate) use grain::GrainMatter;
 pub(crate) use highlight::is_narrow;
 pub(crate) use light::{Incident, LocalLight, way};
 pub(crate) use lobe::{Lobe, pattern};
-pub(crate) use metal_rough::{Around, MetalRoughMatter, MetalRoughPaint, above, open};
-pub(crate) use phong::{PhongMatter, PhongPaint};
-pub(crate) use sheen::SheenMatter;
+pub(crate) use metal_rough::{EnvironmentTerms, MetalRoughBsdf, MetalRoughInputs, above, open};
+pub(crate) use phong::{PhongBsdf, PhongInputs};
+pub(crate) use sheen::SheenLobe;
 pub(crate) use spectrum::{Band, bands};
 
-use super::footing::Footing;
+use super::lobe_frame::LobeFrame;
 use super::optics::reflect;
 use super::patch::Patch;
 use super::sky::Sky;
@@ -40,7 +40,7 @@ use std::f32::consts::PI;
 
 /// How a point of a surface is seen: unit vectors away from it, and from which side.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen {
+pub(crate) struct ShadingFrame {
     /// For shading.
     pub normal: Vec3,
     /// Of the shape itself.
@@ -51,7 +51,7 @@ pub(crate) struct Seen {
     pub outside: bool,
 }
 
-impl Seen {
+impl ShadingFrame {
     /// The mirrored direction, never into the surface.
     #[inline(always)]
     pub(crate) fn mirrored(&self) -> Vec3 {
@@ -60,23 +60,23 @@ impl Seen {
 }
 
 /// The material at one point of a surface.
-pub(crate) struct Matter {
+pub(crate) struct Bsdf {
     /// Whether it is seen from outside.
     outside: bool,
     pub emission: Vec3,
     pub model: Model,
-    /// Its grain, fibres on it, and lacquer over all; seen from outside only.
-    pub grain: Option<GrainMatter>,
-    pub sheen: Option<SheenMatter>,
-    pub coat: Option<CoatMatter>,
+    /// Its grain, fibres on it, and clear coat over all; seen from outside only.
+    pub anisotropy: Option<AnisotropicLobe>,
+    pub sheen: Option<SheenLobe>,
+    pub coat: Option<CoatLobe>,
 }
 
 /// The reflection model at one point.
 #[derive(Clone, Copy)]
 pub(crate) enum Model {
     Unlit(Vec3),
-    Phong(PhongMatter),
-    MetalRough(MetalRoughMatter),
+    Phong(PhongBsdf),
+    MetalRough(MetalRoughBsdf),
 }
 
 impl Model {
@@ -85,21 +85,21 @@ impl Model {
         match self {
             Self::Unlit(color) => *color,
             Self::Phong(m) => m.diffuse,
-            Self::MetalRough(m) => m.paint().base,
+            Self::MetalRough(m) => m.inputs().base,
         }
     }
 }
 
 /// Weights of the secondary rays of a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Balance {
+pub(crate) struct BounceWeights {
     pub reflected: Vec3,
     /// The part of this that clear glass reflects: facets that stop some of it send that on through themselves.
     pub glass: Vec3,
     pub refracted: Vec3,
 }
 
-impl Balance {
+impl BounceWeights {
     /// Of a surface without facets.
     pub(crate) fn smooth(reflected: Vec3, refracted: Vec3) -> Self {
         Self { reflected, refracted, glass: Vec3::ZERO }
@@ -196,40 +196,41 @@ pub(crate) fn base_color(material: &Material, map: Vec4, opacity_map: f32, verte
     if base.is_finite() { base } else { Vec4::ONE }
 }
 
-impl Matter {
+impl Bsdf {
     /// The material at `surface`, whose base colour has been read already.
     pub(crate) fn new(surface: &Surface, base: Vec3, store: &TextureStore) -> Self {
         let reader = Reader { store, patch: surface.patch.as_ref(), known: &[] };
         let material = surface.target.material;
-        let matter = Self { outside: surface.is_outside(), ..Self::read(material, base, &reader) };
-        let Some(m) = material.metal_rough() else { return matter };
-        let matter = matter.thinned(m, &reader);
-        if matter.outside && m.has_lobes() { matter.with_lobes(m, &surface.footing(), &reader) } else { matter }
+        let bsdf = Self { outside: surface.is_outside(), ..Self::read(material, base, &reader) };
+        let Some(m) = material.metal_rough() else { return bsdf };
+        let bsdf = bsdf.thinned(m, &reader);
+        if bsdf.outside && m.has_lobes() { bsdf.with_lobes(m, &surface.lobe_frame(), &reader) } else { bsdf }
     }
 
     /// The same where it scatters light to its other side, if the material does.
     pub(crate) fn thinned(mut self, m: &MetalRough, reader: &Reader) -> Self {
-        if let (Some(translucence), Model::MetalRough(core)) = (&m.translucence, &mut self.model) {
-            core.thin(translucence, reader);
+        if let (Some(diffuse_transmission), Model::MetalRough(core)) = (&m.diffuse_transmission, &mut self.model) {
+            core.thin(diffuse_transmission, reader);
         }
         self
     }
 
-    /// The same with grain, film, sheen and lacquer.
+    /// The same with grain, film, sheen and clear coat.
     #[cold]
-    pub(crate) fn with_lobes(mut self, m: &MetalRough, on: &Footing, reader: &Reader) -> Self {
+    pub(crate) fn with_lobes(mut self, m: &MetalRough, on: &LobeFrame, reader: &Reader) -> Self {
         let Model::MetalRough(core) = &mut self.model else { return self };
-        if let Some(film) = &m.film {
-            core.cover(film, on.normal.dot(on.view).clamp(0.0, 1.0), reader);
+        if let Some(iridescence) = &m.iridescence {
+            core.cover(iridescence, on.normal.dot(on.view).clamp(0.0, 1.0), reader);
         }
-        self.grain = m.grain.as_ref().and_then(|grain| GrainMatter::new(grain, core.roughness(), on, reader));
-        core.brush(self.grain.as_ref(), on.normal, on.view);
-        let occlusion = core.paint().occlusion;
+        self.anisotropy =
+            m.anisotropy.as_ref().and_then(|anisotropy| AnisotropicLobe::new(anisotropy, core.roughness(), on, reader));
+        core.brush(self.anisotropy.as_ref(), on.normal, on.view);
+        let occlusion = core.inputs().occlusion;
         self.under(overlays(m, on, occlusion, reader))
     }
 
     /// The same under these.
-    pub(crate) fn under(mut self, (sheen, coat): (Option<SheenMatter>, Option<CoatMatter>)) -> Self {
+    pub(crate) fn under(mut self, (sheen, coat): (Option<SheenLobe>, Option<CoatLobe>)) -> Self {
         (self.sheen, self.coat) = (sheen, coat);
         self.emission *= self.below_coat();
         self
@@ -249,15 +250,15 @@ impl Matter {
         Self::read(material, reader.base(material).truncate(), &reader)
     }
 
-    /// The material as maps say, but for a grain, film, sheen and lacquer, as seen from outside.
+    /// The material as maps say, but for a grain, film, sheen and clear coat, as seen from outside.
     pub(crate) fn read(material: &Material, base: Vec3, reader: &Reader) -> Self {
         let emission = material.emission * reader.srgb(material.emission_map.as_ref());
         let model = match &material.reflection {
             Reflection::Unlit => Model::Unlit(base),
-            Reflection::Phong(phong) => Model::Phong(PhongMatter::new(phong, base, reader)),
+            Reflection::Phong(phong) => Model::Phong(PhongBsdf::new(phong, base, reader)),
             Reflection::MetalRough(m) => {
                 let shade = reader.linear(material.occlusion_map.as_ref()).x;
-                Model::MetalRough(MetalRoughMatter::new(m, base, occlusion(material, shade), reader))
+                Model::MetalRough(MetalRoughBsdf::new(m, base, occlusion(material, shade), reader))
             }
         };
         Self::bare(model, emission, true)
@@ -265,7 +266,7 @@ impl Matter {
 
     /// A surface of this model without anything over it.
     pub(crate) fn bare(model: Model, emission: Vec3, outside: bool) -> Self {
-        Self { outside, emission, model, grain: None, sheen: None, coat: None }
+        Self { outside, emission, model, anisotropy: None, sheen: None, coat: None }
     }
 
     /// Whether nothing is seen of its surface but what rays find that go on from it.
@@ -278,14 +279,14 @@ impl Matter {
         self.emission == Vec3::ZERO && matches!(&self.model, Model::MetalRough(m) if m.is_clear())
     }
 
-    /// Share of what is under the lacquer that is seen through it.
+    /// Share of what is under the clear coat that is seen through it.
     fn below_coat(&self) -> f32 {
-        self.coat.as_ref().map_or(1.0, CoatMatter::clear)
+        self.coat.as_ref().map_or(1.0, CoatLobe::clear)
     }
 
-    /// Share of what is under fibres and lacquer that is seen through both.
+    /// Share of what is under fibres and clear coat that is seen through both.
     fn clear(&self) -> f32 {
-        self.below_coat() * self.sheen.as_ref().map_or(1.0, SheenMatter::clear)
+        self.below_coat() * self.sheen.as_ref().map_or(1.0, SheenLobe::clear)
     }
 
     /// Whether light does nothing to it.
@@ -299,11 +300,11 @@ impl Matter {
     }
 
     /// What is seen of the light that arrives from everywhere, without a ray: on this side, and through frosted glass.
-    pub(crate) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> [Vec3; 2] {
+    pub(crate) fn ambient(&self, seen: &ShadingFrame, sky: &Sky, ambient: Vec3) -> [Vec3; 2] {
         let [below, through] = match &self.model {
             Model::Unlit(color) => [*color, Vec3::ZERO],
             Model::Phong(m) => [m.ambient * ambient + m.diffuse * sky.diffuse(seen.normal), Vec3::ZERO],
-            Model::MetalRough(m) => m.ambient(seen, sky, ambient, self.grain.as_ref()),
+            Model::MetalRough(m) => m.ambient(seen, sky, ambient, self.anisotropy.as_ref()),
         };
         let mut all = below * self.clear();
         if let Some(sheen) = &self.sheen {
@@ -317,12 +318,12 @@ impl Matter {
 
     /// What is seen of light of this radiance from one direction `to`, per solid angle, of all that [`Self::ambient`] shows on
     /// this side; `ambient` comes from everywhere.
-    pub(crate) fn lit_around(&self, seen: &Seen, to: Vec3, radiance: Vec3, ambient: Vec3) -> Vec3 {
+    pub(crate) fn lit_around(&self, seen: &ShadingFrame, to: Vec3, radiance: Vec3, ambient: Vec3) -> Vec3 {
         let (normal, view, all) = (seen.normal, seen.view, radiance + ambient);
         let below = match &self.model {
             Model::Unlit(_) => Vec3::ZERO,
             Model::Phong(m) => (m.ambient * ambient + m.diffuse * radiance) * (normal.dot(to).max(0.0) / PI),
-            Model::MetalRough(m) => m.lit_around(seen, to, self.grain.as_ref()) * all,
+            Model::MetalRough(m) => m.lit_around(seen, to, self.anisotropy.as_ref()) * all,
         };
         let mut sum = below * self.clear();
         if let Some(sheen) = &self.sheen {
@@ -350,18 +351,18 @@ impl Matter {
         }
     }
 
-    /// Whether lights without extent are seen in what is under the lacquer so small that they must be widened.
+    /// Whether lights without extent are seen in what is under the clear coat so small that they must be widened.
     pub(crate) fn has_narrow_highlight(&self) -> bool {
         matches!(&self.model, Model::MetalRough(m) if m.has_narrow_highlight())
     }
 
-    /// Widens the highlights of lights under the lacquer to this squared width α², where they are narrower.
+    /// Widens the highlights of lights under the clear coat to this squared width α², where they are narrower.
     pub(crate) fn widen_highlight(&mut self, to: f32) {
         if let Model::MetalRough(m) = &mut self.model {
             m.widen_highlight(to);
         }
-        if let Some(grain) = &mut self.grain {
-            grain.widen_highlight(to);
+        if let Some(anisotropy) = &mut self.anisotropy {
+            anisotropy.widen_highlight(to);
         }
     }
 
@@ -369,7 +370,7 @@ impl Matter {
     pub(crate) fn lobe(&self, normal: Vec3) -> Option<Lobe> {
         let Model::MetalRough(m) = &self.model else { return None };
         let alpha = m.spreads()?;
-        Some(self.grain.as_ref().map_or_else(|| Lobe::even(normal, alpha), |g| g.lobe(normal)))
+        Some(self.anisotropy.as_ref().map_or_else(|| Lobe::even(normal, alpha), |g| g.lobe(normal)))
     }
 
     /// Roughness of the lobe that [`Self::ambient`] looks up, if there is one.
@@ -402,16 +403,16 @@ impl Matter {
         self.lit_over(below, (horizon, normal, view), to_light, light)
     }
 
-    /// What the metallic-rough surface under fibres and lacquer shows: BRDF × N·L.
-    fn lit_below(&self, m: &MetalRoughMatter, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
-        match &self.grain {
+    /// What the metallic-rough surface under fibres and clear coat shows: BRDF × N·L.
+    fn lit_below(&self, m: &MetalRoughBsdf, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+        match &self.anisotropy {
             _ if !self.outside => m.lit_inside(normal, view, to_light),
             None => m.lit(normal, view, to_light),
-            Some(grain) => m.lit_by(normal, view, to_light, |_| grain.widened(normal, view, to_light)),
+            Some(anisotropy) => m.lit_by(normal, view, to_light, |_| anisotropy.widened(normal, view, to_light)),
         }
     }
 
-    /// What is seen where `below` comes from under fibres and lacquer, which show light of this irradiance, too.
+    /// What is seen where `below` comes from under fibres and clear coat, which show light of this irradiance, too.
     fn lit_over(
         &self,
         below: Vec3,
@@ -453,18 +454,18 @@ impl Matter {
     }
 
     /// How much of the mirrored and of the refracted direction is seen; `cosine` is that of the view.
-    pub(crate) fn balance(&self, cosine: f32, crossing: &Crossing) -> Balance {
-        let Balance { reflected, glass, refracted } = match &self.model {
-            Model::Unlit(_) => Balance::default(),
-            Model::Phong(m) => m.balance(cosine, crossing),
-            Model::MetalRough(m) => m.balance(cosine, crossing, self.outside),
+    pub(crate) fn bounce_weights(&self, cosine: f32, crossing: &Crossing) -> BounceWeights {
+        let BounceWeights { reflected, glass, refracted } = match &self.model {
+            Model::Unlit(_) => BounceWeights::default(),
+            Model::Phong(m) => m.bounce_weights(cosine, crossing),
+            Model::MetalRough(m) => m.bounce_weights(cosine, crossing, self.outside),
         };
         let clear = self.clear();
-        Balance { reflected: reflected * clear, glass: glass * clear, refracted: refracted * clear }
+        BounceWeights { reflected: reflected * clear, glass: glass * clear, refracted: refracted * clear }
     }
 
-    /// The normal of the lacquer over it, and the weight of the mirror ray off that.
-    pub(crate) fn lacquer(&self) -> Option<(Vec3, f32)> {
+    /// The normal of the clear coat over it, and the weight of the mirror ray off that.
+    pub(crate) fn coat_reflection(&self) -> Option<(Vec3, f32)> {
         self.coat.as_ref().map(|coat| (coat.normal, coat.mirrored()))
     }
 
@@ -488,18 +489,18 @@ impl Matter {
     }
 }
 
-/// Sheen and lacquer of a material at a point that sees such a share of its surroundings.
+/// Sheen and clear coat of a material at a point that sees such a share of its surroundings.
 pub(crate) fn overlays(
     m: &MetalRough,
-    on: &Footing,
+    on: &LobeFrame,
     occlusion: f32,
     reader: &Reader,
-) -> (Option<SheenMatter>, Option<CoatMatter>) {
+) -> (Option<SheenLobe>, Option<CoatLobe>) {
     let n_v = on.normal.dot(on.view).clamp(0.0, 1.0);
-    let sheen = m.sheen.as_ref().and_then(|sheen| SheenMatter::new(sheen, n_v, reader));
+    let sheen = m.sheen.as_ref().and_then(|sheen| SheenLobe::new(sheen, n_v, reader));
     let coat = m.coat.as_ref().and_then(|coat| {
         let normal = on.coat_normal(coat.normal_map.as_ref(), coat.normal_scale, reader.store);
-        CoatMatter::new(coat, normal, on.view, occlusion, reader)
+        CoatLobe::new(coat, normal, on.view, occlusion, reader)
     });
     (sheen, coat)
 }

@@ -3,7 +3,7 @@
 //! B. T. Phong, "Illumination for Computer Generated Pictures" (1975); T. Whitted, "An Improved Illumination Model for
 //! Shaded Display" (1980). Nothing is divided by π: a light of strength 1 shows a white surface that faces it as 1.
 
-use super::{Balance, Reader};
+use super::{BounceWeights, Reader};
 use crate::math::Vec3;
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, reflect};
 use crate::render::wave::Crossing;
@@ -11,7 +11,7 @@ use crate::scene::Phong;
 
 /// Phong's parameters at one point.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PhongMatter {
+pub(crate) struct PhongBsdf {
     pub ambient: Vec3,
     pub diffuse: Vec3,
     pub specular: Vec3,
@@ -25,7 +25,7 @@ pub(crate) struct PhongMatter {
 
 /// Those of them that maps change.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PhongPaint {
+pub(crate) struct PhongInputs {
     pub ambient: Vec3,
     pub diffuse: Vec3,
     pub specular: Vec3,
@@ -33,7 +33,7 @@ pub(crate) struct PhongPaint {
     pub shininess: f32,
 }
 
-impl PhongPaint {
+impl PhongInputs {
     /// From the diffuse colour, and what maps of the others say.
     #[inline(always)]
     pub(crate) fn of(phong: &Phong, diffuse: Vec3, (ambient, specular, shininess): (Vec3, Vec3, f32)) -> Self {
@@ -48,12 +48,12 @@ impl PhongPaint {
     }
 }
 
-impl PhongMatter {
+impl PhongBsdf {
     pub(super) fn new(phong: &Phong, diffuse: Vec3, reader: &Reader) -> Self {
         let [ambient, specular] = [&phong.ambient_map, &phong.specular_map].map(|map| reader.srgb(map.as_ref()));
         let shininess = reader.linear(phong.shininess_map.as_ref()).x;
-        let PhongPaint { ambient, diffuse, specular, mirror, shininess } =
-            PhongPaint::of(phong, diffuse, (ambient, specular, shininess));
+        let PhongInputs { ambient, diffuse, specular, mirror, shininess } =
+            PhongInputs::of(phong, diffuse, (ambient, specular, shininess));
         Self {
             ambient,
             diffuse,
@@ -68,15 +68,15 @@ impl PhongMatter {
     }
 
     /// The numbers that maps have said.
-    pub(crate) fn paint(&self) -> PhongPaint {
+    pub(crate) fn inputs(&self) -> PhongInputs {
         let Self { ambient, diffuse, specular, mirror, shininess, .. } = *self;
-        PhongPaint { ambient, diffuse, specular, mirror, shininess }
+        PhongInputs { ambient, diffuse, specular, mirror, shininess }
     }
 
     /// The same with other numbers of a map.
     #[inline(always)]
-    pub(crate) fn painted(&self, paint: PhongPaint) -> Self {
-        let PhongPaint { ambient, diffuse, specular, mirror, shininess } = paint;
+    pub(crate) fn painted(&self, inputs: PhongInputs) -> Self {
+        let PhongInputs { ambient, diffuse, specular, mirror, shininess } = inputs;
         Self { ambient, diffuse, specular, mirror, shininess, ..*self }
     }
 
@@ -149,22 +149,22 @@ impl PhongMatter {
     /// Without Fresnel the weights are the material's own, and total reflection adds what cannot pass to the mirror.
     /// With it an opaque surface reflects more at grazing angles (Schlick), and a transparent one splits the light by
     /// the exact formula for dielectrics.
-    pub(super) fn balance(&self, cosine: f32, crossing: &Crossing) -> Balance {
+    pub(super) fn bounce_weights(&self, cosine: f32, crossing: &Crossing) -> BounceWeights {
         let share = fresnel_dielectric(f64::from(cosine), f64::from(crossing.n_i), f64::from(crossing.n_t));
         #[expect(clippy::cast_possible_truncation, reason = "a share of light")]
         let share = share as f32;
         let transparent = self.transmission != Vec3::ZERO;
         match (self.fresnel, transparent) {
             (false, true) if share == 1.0 && crossing.n_i > crossing.n_t => {
-                Balance::smooth((self.mirror + self.transmission).min(Vec3::ONE), Vec3::ZERO)
+                BounceWeights::smooth((self.mirror + self.transmission).min(Vec3::ONE), Vec3::ZERO)
             }
-            (false, _) => Balance::smooth(self.mirror, self.transmission),
-            (true, false) => Balance::smooth(self.reflected(cosine), Vec3::ZERO),
+            (false, _) => BounceWeights::smooth(self.mirror, self.transmission),
+            (true, false) => BounceWeights::smooth(self.reflected(cosine), Vec3::ZERO),
             (true, true) => {
                 // Inside, what is turned back has been let in before and is not the mirror's to weaken.
                 let inside = crossing.n_i > crossing.n_t;
                 let mirror = if inside { self.mirror.max(self.transmission) } else { self.mirror };
-                Balance::smooth(mirror * share, self.transmission * (1.0 - share))
+                BounceWeights::smooth(mirror * share, self.transmission * (1.0 - share))
             }
         }
     }
@@ -175,8 +175,8 @@ mod tests {
     use super::*;
     use crate::render::wave::{Media, Medium};
 
-    fn matter() -> PhongMatter {
-        PhongMatter {
+    fn bsdf() -> PhongBsdf {
+        PhongBsdf {
             ambient: Vec3::ZERO,
             diffuse: Vec3::new(0.5, 0.25, 0.0),
             specular: Vec3::splat(0.5),
@@ -201,59 +201,59 @@ mod tests {
     #[test]
     fn diffuse_and_specular_follow_their_cosines() {
         // Light at 60°, seen from 30° on the other side: α = 30°.
-        let seen = matter().lit(Vec3::Z, at(-30.0), at(60.0));
+        let seen = bsdf().lit(Vec3::Z, at(-30.0), at(60.0));
         let (diffuse, highlight) = (0.5, 0.75);
-        assert!((seen - (matter().diffuse * diffuse + Vec3::splat(0.5 * highlight))).length() < 1e-6);
+        assert!((seen - (bsdf().diffuse * diffuse + Vec3::splat(0.5 * highlight))).length() < 1e-6);
     }
 
     #[test]
     fn a_light_below_the_horizon_gives_no_highlight() {
-        assert_eq!(matter().lit(Vec3::Z, at(-85.0), at(95.0)), Vec3::ZERO);
+        assert_eq!(bsdf().lit(Vec3::Z, at(-85.0), at(95.0)), Vec3::ZERO);
     }
 
     #[test]
     fn a_highlight_seen_from_behind_the_mirrored_light_is_clamped_to_zero() {
-        let seen = matter().lit(Vec3::Z, at(80.0), at(80.0));
-        assert!((seen - matter().diffuse * at(80.0).z).length() < 1e-6);
+        let seen = bsdf().lit(Vec3::Z, at(80.0), at(80.0));
+        assert!((seen - bsdf().diffuse * at(80.0).z).length() < 1e-6);
     }
 
     #[test]
     fn a_light_seen_through_peaks_in_the_refracted_direction() {
-        let through = |light: f32| matter().lit_through(Vec3::Z, at(-40.0), at(light), &into_glass()).x;
+        let through = |light: f32| bsdf().lit_through(Vec3::Z, at(-40.0), at(light), &into_glass()).x;
         // Snell: the light that reaches 40° outside travels 180° + asin(sin 40° / 1.5) inside.
         let refracted = 180.0 - libm::asinf(libm::sinf(40f32.to_radians()) / 1.5).to_degrees();
         assert!((through(refracted) - 0.75).abs() < 1e-5);
         assert!(through(refracted - 10.0) < 0.75 && through(refracted + 10.0) < 0.75);
         assert_eq!(through(20.0), 0.0, "a light on the viewer's side is not seen through");
         let same = Media::default().cross(Medium { material: 0, ior: 1.0 }, true);
-        assert_eq!(matter().lit_through(Vec3::Z, at(-40.0), at(160.0), &same), Vec3::ZERO);
+        assert_eq!(bsdf().lit_through(Vec3::Z, at(-40.0), at(160.0), &same), Vec3::ZERO);
     }
 
     #[test]
     fn without_fresnel_the_weights_are_the_materials() {
-        let balance = matter().balance(0.3, &into_glass());
-        assert_eq!(balance, Balance::smooth(Vec3::splat(0.25), Vec3::splat(0.75)));
+        let bounce_weights = bsdf().bounce_weights(0.3, &into_glass());
+        assert_eq!(bounce_weights, BounceWeights::smooth(Vec3::splat(0.25), Vec3::splat(0.75)));
     }
 
     #[test]
     fn total_reflection_loses_nothing() {
         let out = into_glass().beyond.cross(Medium { material: 0, ior: 1.5 }, false);
         for fresnel in [false, true] {
-            let glass = PhongMatter { fresnel, mirror: Vec3::ZERO, transmission: Vec3::ONE, ..matter() };
-            assert_eq!(glass.balance(0.1, &out), Balance::smooth(Vec3::ONE, Vec3::ZERO));
+            let glass = PhongBsdf { fresnel, mirror: Vec3::ZERO, transmission: Vec3::ONE, ..bsdf() };
+            assert_eq!(glass.bounce_weights(0.1, &out), BounceWeights::smooth(Vec3::ONE, Vec3::ZERO));
         }
     }
 
     #[test]
     fn fresnel_shares_the_light_between_mirror_and_transmission() {
-        let glass = PhongMatter { fresnel: true, mirror: Vec3::ONE, transmission: Vec3::ONE, ..matter() };
+        let glass = PhongBsdf { fresnel: true, mirror: Vec3::ONE, transmission: Vec3::ONE, ..bsdf() };
         for cosine in [0.05, 0.4, 1.0] {
-            let balance = glass.balance(cosine, &into_glass());
-            assert!((balance.reflected + balance.refracted - Vec3::ONE).length() < 1e-6);
+            let bounce_weights = glass.bounce_weights(cosine, &into_glass());
+            assert!((bounce_weights.reflected + bounce_weights.refracted - Vec3::ONE).length() < 1e-6);
         }
-        assert!((glass.balance(1.0, &into_glass()).reflected.x - 0.04).abs() < 1e-6);
-        let lacquer = PhongMatter { transmission: Vec3::ZERO, fresnel: true, ..matter() };
-        assert_eq!(lacquer.balance(1.0, &into_glass()).reflected, Vec3::splat(0.25));
-        assert_eq!(lacquer.balance(0.0, &into_glass()).reflected, Vec3::ONE);
+        assert!((glass.bounce_weights(1.0, &into_glass()).reflected.x - 0.04).abs() < 1e-6);
+        let varnish = PhongBsdf { transmission: Vec3::ZERO, fresnel: true, ..bsdf() };
+        assert_eq!(varnish.bounce_weights(1.0, &into_glass()).reflected, Vec3::splat(0.25));
+        assert_eq!(varnish.bounce_weights(0.0, &into_glass()).reflected, Vec3::ONE);
     }
 }

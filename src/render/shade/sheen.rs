@@ -4,7 +4,7 @@
 //! M. Pettineo, "Crafting a Next-Gen Material Pipeline for The Order: 1886" (2013). What the fibres send back is taken off
 //! what is below them.
 
-use super::{Reader, Seen, Sky};
+use super::{Reader, ShadingFrame, Sky};
 use crate::math::Vec3;
 use crate::math::formula::{power, sin_cos_of_turns};
 use crate::math::simd::{Kernel, Level, Simd};
@@ -27,14 +27,14 @@ const WIDE: f32 = 0.5;
 
 /// The fibres at one point.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SheenMatter {
+pub(crate) struct SheenLobe {
     pub color: Vec3,
     pub roughness: f32,
     /// What all of them send back, seen from here.
     pub albedo: f32,
 }
 
-impl SheenMatter {
+impl SheenLobe {
     /// No fibres.
     pub(crate) const NONE: Self = Self { color: Vec3::ZERO, roughness: 1.0, albedo: 0.0 };
 
@@ -63,7 +63,7 @@ impl SheenMatter {
     }
 
     /// What it shows of the surroundings.
-    pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
+    pub(super) fn ambient(&self, seen: &ShadingFrame, sky: &Sky, ambient: Vec3) -> Vec3 {
         self.around(sky.blurred(seen.mirrored(), Self::blur(self.roughness)) + ambient)
     }
 
@@ -163,8 +163,8 @@ fn row(i: usize) -> &'static [f32; ENTRIES] {
 mod tests {
     use super::*;
 
-    fn white(roughness: f32, n_v: f32) -> SheenMatter {
-        SheenMatter { color: Vec3::ONE, roughness, albedo: albedo(roughness, n_v) }
+    fn white(roughness: f32, n_v: f32) -> SheenLobe {
+        SheenLobe { color: Vec3::ONE, roughness, albedo: albedo(roughness, n_v) }
     }
 
     #[test]
@@ -215,7 +215,7 @@ mod tests {
 
     #[test]
     fn what_fibres_send_back_is_taken_off_what_is_below() {
-        let cloth = SheenMatter { color: Vec3::new(0.5, 0.0, 0.0), ..white(0.8, 0.2) };
+        let cloth = SheenLobe { color: Vec3::new(0.5, 0.0, 0.0), ..white(0.8, 0.2) };
         assert!((cloth.clear() + 0.5 * cloth.albedo - 1.0).abs() < 1e-6);
         assert!(cloth.clear() < 1.0);
     }

@@ -1,24 +1,24 @@
 //! What rays that leave the scene see, and what arrives from there without a ray.
 
-mod around;
 mod beyond;
-mod chance;
 mod diffuse;
-mod glare;
+mod distribution;
+mod environment_rays;
 mod gloss;
+mod hotspot;
 mod lookups;
 mod panorama;
 
-pub(crate) use around::{Arounds, Standpoint};
+pub(crate) use environment_rays::{EnvironmentPoint, EnvironmentRays};
 
-use super::shade::{Lobe, Seen};
+use super::shade::{Lobe, ShadingFrame};
 use super::studio;
 use crate::image::ToneMap;
 use crate::math::Vec3;
 use crate::scene::features::is_unlit;
 use crate::scene::{Background, Environment, Scene, UpAxis};
-use chance::Chance;
-use glare::Glare;
+use distribution::EnvironmentDistribution;
+use hotspot::Hotspot;
 use panorama::Pyramid;
 
 /// Angle across of cones, radians, from which the studio is blurred, little by little up to twice that: where smooth surfaces
@@ -44,9 +44,9 @@ pub(crate) struct Sky {
 #[derive(Clone, Debug)]
 struct Map {
     pyramid: Pyramid,
-    chance: Chance,
+    chance: EnvironmentDistribution,
     /// If it has any, and somebody has asked.
-    glare: Option<Glare>,
+    hotspot: Option<Hotspot>,
     /// Sine and cosine of its rotation about the up axis.
     turn: (f32, f32),
 }
@@ -57,8 +57,9 @@ impl Sky {
         let panorama = scene.panorama.as_ref().filter(|_| scene.environment == Environment::Panorama);
         let map = panorama.filter(|p| !p.texels.is_empty()).map(|panorama| {
             let pyramid = Pyramid::new(panorama);
-            let chance = Chance::new(pyramid.at_most(chance::COLUMNS).clone(), chance::EVEN);
-            Map { pyramid, chance, glare: None, turn: libm::sincosf(panorama.rotation) }
+            let chance =
+                EnvironmentDistribution::new(pyramid.at_most(distribution::COLUMNS).clone(), distribution::EVEN);
+            Map { pyramid, chance, hotspot: None, turn: libm::sincosf(panorama.rotation) }
         });
         let is_toned = is_unlit(scene);
         Self { environment: scene.environment, up: scene.up, backdrop, is_toned, walls: 1.0, map }
@@ -127,7 +128,7 @@ impl Sky {
 
     /// Mean radiance as the facets of a rough mirror show it, seen as said: of a picture by the very facets that are seen,
     /// else around the mirrored direction.
-    pub(crate) fn mirrored(&self, seen: &Seen, roughness: f32) -> Vec3 {
+    pub(crate) fn mirrored(&self, seen: &ShadingFrame, roughness: f32) -> Vec3 {
         let exact = self.map.as_ref().and_then(|map| {
             let lobe = Lobe::even(seen.normal, roughness * roughness);
             map.pyramid.mirrored(&lobe, seen.view, |dir| self.to_map(map, dir))

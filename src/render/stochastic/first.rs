@@ -1,7 +1,7 @@
 //! The first sample of every pixel, and what it shows: in columns, since most pixels need no more.
 
 use super::Sampler;
-use super::around::Around;
+use super::neighborhood::Neighborhood;
 use super::pixel::Pixel;
 use super::places::Places;
 use crate::accel::Accel;
@@ -83,7 +83,7 @@ impl First {
     }
 
     /// Copies what it shows of what lies around a tile.
-    pub(super) fn show(&self, around: &mut Around) {
+    pub(super) fn show(&self, around: &mut Neighborhood) {
         let (inner, columns) = (around.tile, around.columns());
         for &(part, mut from) in self.parts.iter().filter(|(part, _)| part.meets(inner)) {
             for block in part.blocks() {

@@ -6,8 +6,8 @@
 //! looked at in these rounds, too. Where pixels start with one sample, tiles share these ([`shared`]); all others are traced by
 //! this tile for itself, and counted: which there are depends on all of a tile, and no tile may wait for another to be done.
 
-mod around;
 mod first;
+mod neighborhood;
 mod pixel;
 mod places;
 mod shared;
@@ -27,8 +27,8 @@ use super::tile::{End, PixelFacts, TOGETHER, Tile, TilePixels, put_row};
 use super::whitted::Tracer;
 use crate::accel::Accel;
 use crate::image::Output;
-use around::Around;
 use first::First;
+use neighborhood::Neighborhood;
 use pixel::Pixel;
 pub(in crate::render) use places::{Places, Wanted};
 pub(super) use shared::render_all;
@@ -76,7 +76,7 @@ struct Sampler<'a> {
 struct Course {
     tile: Tile,
     /// What is seen of it and around it.
-    around: Around,
+    around: Neighborhood,
     /// Pixels that have, or get, more than one sample.
     pixels: Vec<Pixel>,
     /// Those that go on, by number.
@@ -155,7 +155,7 @@ impl<'a> Sampler<'a> {
     /// What a tile begins with, and what is done of it then.
     fn begin(&self, tile: Tile, first: &[&First]) -> (Course, TilePixels) {
         let reach = self.reach();
-        let mut around = Around::new(self.grown(tile, reach), first);
+        let mut around = Neighborhood::new(self.grown(tile, reach), first);
         let (mut pixels, mut done) = (Vec::with_capacity(around.tile.pixels()), self.nothing(tile));
         if self.starts_with_one() {
             let known = self.grown(tile, reach.saturating_sub(1));
@@ -198,8 +198,8 @@ impl<'a> Sampler<'a> {
         Some(())
     }
 
-    /// Finds out how certain the pixels that go on are, with so many samples; those beside them that seemed so with fewer, and are
-    /// not by what is known now, get as many.
+    /// Finds out how certain the pixels that go on are, with so many samples; those beside them that seemed so with fewer,
+    /// and are not by what is known now, get as many.
     fn look<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, course: &mut Course, samples: u32) -> Option<()> {
         let Course { tile, around, pixels, active, places, errors } = course;
         around.look(&self.judge, pixels, active, errors);
@@ -231,7 +231,7 @@ impl<'a> Sampler<'a> {
     fn take_first(
         &self,
         first: &[&First],
-        around: &mut Around,
+        around: &mut Neighborhood,
         known: Tile,
         (pixels, done): (&mut Vec<Pixel>, &mut TilePixels),
     ) {

@@ -3,9 +3,9 @@
 use crate::accel::Accel;
 use crate::math::simd::{Kernel, Level, Simd};
 use crate::render::draws::Stream;
-use crate::render::eyes::Place;
 use crate::render::frame::{Frame, pixel_keys};
 use crate::render::observer::Observer;
+use crate::render::primary_rays::Place;
 use crate::render::roulette::Roulette;
 use crate::render::sampling::{Filter, Stochastic};
 use crate::render::sobol;

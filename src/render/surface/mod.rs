@@ -3,11 +3,11 @@
 //! Evaluated once, for the hit that counts. Nothing here knows of light; materials are asked for their normal and bump maps,
 //! and for what tells where they are there at all. Whatever a file gives, normals come out finite and of unit length.
 
-use super::branch::Ground;
+use super::branch::ShadingPoint;
 use super::context::Context;
-use super::footing::Footing;
+use super::lobe_frame::LobeFrame;
 use super::patch::{Footprint, Gradients, Patch, color_at, coordinates_at};
-use super::shade::{Seen, base_color, has_inside};
+use super::shade::{ShadingFrame, base_color, has_inside};
 use super::texture::TextureStore;
 use super::world::{Placement, PrimSource, World};
 use crate::accel::refine::Refined;
@@ -19,7 +19,7 @@ use std::cell::Cell;
 
 /// What was hit, before anything about it is computed.
 #[derive(Clone, Copy)]
-pub(crate) struct Target<'a> {
+pub(crate) struct HitPrim<'a> {
     pub prim: u32,
     /// Instances first, then spheres, then cones, then planes.
     pub instance: u32,
@@ -29,7 +29,7 @@ pub(crate) struct Target<'a> {
     source: PrimSource,
 }
 
-impl<'a> Target<'a> {
+impl<'a> HitPrim<'a> {
     pub(crate) fn new(scene: &'a Scene, world: &'a World, prim: u32) -> Self {
         let source = world.source(prim);
         let of_instance = |instance: u32| {
@@ -104,7 +104,7 @@ impl<'a> Target<'a> {
 /// The normal that a file gives for a point of a face: interpolated, of unit length, on whatever side the file has it.
 /// `None` where it gives none.
 pub fn given_normal(scene: &Scene, world: &World, prim: u32, at: &Refined) -> Option<Vec3> {
-    Target::new(scene, world, prim).patch(world, at.u, at.v, at.position)?.normal()
+    HitPrim::new(scene, world, prim).patch(world, at.u, at.v, at.position)?.normal()
 }
 
 /// First corner and length of a polygon in its mesh.
@@ -138,7 +138,7 @@ fn fan_triangle(mesh: &Mesh, world: &World, prim: u32, source: PrimSource, posit
 
 /// A point of a surface, as seen along a ray. Positions in the centred frame, directions in world space.
 pub(crate) struct Surface<'a> {
-    pub target: Target<'a>,
+    pub target: HitPrim<'a>,
     pub patch: Option<Patch<'a>>,
     pub footprint: Footprint,
     pub position: Vec3,
@@ -165,7 +165,7 @@ pub(crate) struct Surface<'a> {
 
 impl<'a> Surface<'a> {
     /// The surface at `hit` of `ray` whose cone is `width` wide there.
-    pub(crate) fn new(world: &World, target: Target<'a>, ray: &Ray, hit: &Hit, width: f32) -> Self {
+    pub(crate) fn new(world: &World, target: HitPrim<'a>, ray: &Ray, hit: &Hit, width: f32) -> Self {
         let refined = world.refine(ray, hit);
         let view = -ray.dir.try_normalize().unwrap_or(Vec3::Z);
         let mut patch = target.patch(world, refined.u, refined.v, refined.position);
@@ -220,9 +220,9 @@ impl<'a> Surface<'a> {
     }
 
     /// What lobes over it lie on.
-    pub(crate) fn footing(&self) -> Footing<'_> {
+    pub(crate) fn lobe_frame(&self) -> LobeFrame<'_> {
         let Self { smooth, side, normal, view, .. } = *self;
-        Footing { patch: self.patch.as_ref(), smooth, side, normal, view }
+        LobeFrame { patch: self.patch.as_ref(), smooth, side, normal, view }
     }
 
     /// How its normal turns along both axes of the ray's cone before maps turn it.
@@ -261,8 +261,8 @@ impl<'a> Surface<'a> {
     }
 
     /// How it is seen.
-    pub(crate) fn seen(&self) -> Seen {
-        Seen { normal: self.normal, geometric: self.geometric, view: self.view, outside: self.is_outside() }
+    pub(crate) fn seen(&self) -> ShadingFrame {
+        ShadingFrame { normal: self.normal, geometric: self.geometric, view: self.view, outside: self.is_outside() }
     }
 
     /// A ray from here along `dir` (of any length) up to `t_max`; it starts outside the error of the position, on the
@@ -282,12 +282,12 @@ impl<'a> Surface<'a> {
     }
 }
 
-impl Ground for Surface<'_> {
+impl ShadingPoint for Surface<'_> {
     fn material(&self) -> (u32, &Material) {
         (self.target.material_id, self.target.material)
     }
 
-    fn seen(&self) -> Seen {
+    fn seen(&self) -> ShadingFrame {
         self.seen()
     }
 

@@ -39,7 +39,7 @@ fn seen<T>(scene: &Scene, from: f32, look: impl FnOnce(Surface, &TextureStore) -
     let ray = Ray { origin, t_min: 0.0, dir: Vec3::NEG_Z * from.signum(), t_max: 9.0, exclude: NO_PRIM, sample: 0 };
     let mut hits = [Hit::MISS];
     Unculled::new(&world.shapes).closest(&[ray], &mut hits, &mut (), &mut NoProbe);
-    let target = Target::new(scene, &world, hits[0].prim);
+    let target = HitPrim::new(scene, &world, hits[0].prim);
     let mut surface = Surface::new(&world, target, &ray, &hits[0], 1e-4);
     let store = TextureStore::new(scene);
     surface.shade_smoothly(&store);

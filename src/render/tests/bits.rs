@@ -4,12 +4,12 @@ use super::*;
 use crate::math::Vec2;
 use crate::math::random::Random;
 use crate::render::context::Gloss;
-use crate::render::strip::Common;
+use crate::render::shading_batch::MaterialConstants;
 use crate::render::texture::TextureStore;
 use crate::render::{Sampling, Stochastic};
 use crate::scene::{
-    AlphaMode, Bitmap, Coat, Environment, Film, Grain, MetalRough, Panorama, Pixels, Sampler, Sheen, Texture,
-    TextureRef, Translucence, UvTransform, Wrap,
+    AlphaMode, Anisotropy, Bitmap, Coat, DiffuseTransmission, Environment, Iridescence, MetalRough, Panorama, Pixels,
+    Sampler, Sheen, Texture, TextureRef, UvTransform, Wrap,
 };
 use std::sync::Arc;
 
@@ -205,8 +205,9 @@ fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one()
     for (depth, environment) in [(1, Environment::Studio), (0, Environment::Studio), (1, Environment::Black)] {
         let mut s = painted();
         let store = TextureStore::new(&s.scene);
-        let beside =
-            |m: &Material| Common::of((0, m), &store, depth > 0, Gloss::new(None)).is_some_and(|common| common.mapped);
+        let beside = |m: &Material| {
+            MaterialConstants::of((0, m), &store, depth > 0, Gloss::new(None)).is_some_and(|common| common.mapped)
+        };
         assert!(s.scene.materials.iter().all(beside), "nothing would be compared");
         (s.settings.depth, s.scene.environment) = (Some(depth), environment);
         same_one_by_one(&mut s, &format!("depth {depth}, {environment:?}"));
@@ -326,7 +327,7 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
         let mut s = glazed(if textures > 0 { painted() } else { plain() }, textures);
         let store = TextureStore::new(&s.scene);
         let beside = |m: &&Material| {
-            Common::of((0, m), &store, true, Gloss::new(None)).is_some_and(|common| common.glass.is_some())
+            MaterialConstants::of((0, m), &store, true, Gloss::new(None)).is_some_and(|common| common.glass.is_some())
         };
         // What scatters inside is shaded one by one.
         let expected = if textures > 0 { 4 } else { 6 };
@@ -366,14 +367,15 @@ fn lobed(mut s: Stage, textures: u32) -> Stage {
             let (color, color_map) = (Vec3::new(0.5, 0.9, 0.2), map(i, 1));
             Box::new(Sheen { color, color_map, roughness: 0.4, roughness_map: map(i, 1).filter(|_| i > 1) })
         });
-        m.film = has(2).then(|| {
+        m.iridescence = has(2).then(|| {
             let (strength_map, thickness_map) = (map(i, 2), map(i, 0));
-            Box::new(Film { strength: 0.9, strength_map, ior: 1.4, thickness: [120.0, 480.0], thickness_map })
+            Box::new(Iridescence { strength: 0.9, strength_map, ior: 1.4, thickness: [120.0, 480.0], thickness_map })
         });
-        m.grain = has(3).then(|| Box::new(Grain { strength: 0.7, rotation: 0.3, map: map(i, 0).filter(|_| i != 3) }));
-        m.translucence = (m.transmission == 0.0 && i % 2 == 0).then(|| {
+        m.anisotropy =
+            has(3).then(|| Box::new(Anisotropy { strength: 0.7, rotation: 0.3, map: map(i, 0).filter(|_| i != 3) }));
+        m.diffuse_transmission = (m.transmission == 0.0 && i % 2 == 0).then(|| {
             let (color, color_map) = (Vec3::new(0.9, 0.6, 0.3), map(i, 1));
-            Box::new(Translucence { share: 0.7, share_map: map(i, 2).filter(|_| i > 0), color, color_map })
+            Box::new(DiffuseTransmission { share: 0.7, share_map: map(i, 2).filter(|_| i > 0), color, color_map })
         });
         let pane = m.thick && m.transmission > 0.0;
         (m.specular, m.specular_map) = (0.7, map(i, 1).filter(|_| pane || i % 3 == 0));
@@ -404,14 +406,14 @@ fn lobes_shaded_side_by_side_have_the_bits_of_lobes_shaded_one_by_one() {
         (s.settings.depth, s.settings.env_rays, s.scene.environment) = (Some(depth), env_rays, environment);
         let store = TextureStore::new(&s.scene);
         let beside = |m: &&Material| {
-            Common::of((0, m), &store, true, Gloss::new(None)).is_some_and(|common| common.lobes.is_some())
+            MaterialConstants::of((0, m), &store, true, Gloss::new(None)).is_some_and(|common| common.lobes.is_some())
         };
         assert!(s.scene.materials.iter().filter(beside).count() >= 5, "nothing would be compared");
         same_one_by_one(&mut s, &format!("{textures} textures, depth {depth}"));
     }
 }
 
-/// The same with sheen and lacquer alone over what is metallic-rough, one or both, smooth and rough, their maps of so many
+/// The same with sheen and clear coat alone over what is metallic-rough, one or both, smooth and rough, their maps of so many
 /// textures.
 fn overlaid(mut s: Stage, textures: u32) -> Stage {
     let map = |i: usize, texture: u32| {
@@ -438,7 +440,7 @@ fn overlaid(mut s: Stage, textures: u32) -> Stage {
 }
 
 #[test]
-fn sheen_and_lacquer_over_points_side_by_side_have_the_bits_of_those_over_points_one_by_one() {
+fn sheen_and_coat_over_points_side_by_side_have_the_bits_of_those_over_points_one_by_one() {
     let cases = [
         (Environment::Studio, 0, 1, None),
         (Environment::Studio, 3, 1, None),
@@ -455,7 +457,7 @@ fn sheen_and_lacquer_over_points_side_by_side_have_the_bits_of_those_over_points
         (s.settings.depth, s.settings.env_rays, s.scene.environment) = (Some(depth), env_rays, environment);
         let store = TextureStore::new(&s.scene);
         let are_overlays = |m: &&Material| {
-            let common = Common::of((0, m), &store, true, Gloss::new(None));
+            let common = MaterialConstants::of((0, m), &store, true, Gloss::new(None));
             common.and_then(|common| common.lobes).is_some_and(|lobes| lobes.are_overlays)
         };
         assert!(s.scene.materials.iter().filter(are_overlays).count() >= 4, "nothing would be compared");
@@ -470,8 +472,9 @@ fn rough_surfaces_that_spread_rays_have_the_same_bits_side_by_side() {
         s.settings = Settings { gloss_rays: Some(2), depth: Some(depth), samples: 2, ..s.settings };
         s.scene.environment = Environment::Studio;
         let store = TextureStore::new(&s.scene);
-        let beside =
-            |m: &&Material| Common::of((0, m), &store, true, Gloss::new(Some(2))).is_some_and(|common| common.spreads);
+        let beside = |m: &&Material| {
+            MaterialConstants::of((0, m), &store, true, Gloss::new(Some(2))).is_some_and(|common| common.spreads)
+        };
         assert!(s.scene.materials.iter().filter(beside).count() >= 5, "nothing would be compared");
         let together = same_one_by_one(&mut s, &format!("{textures} textures, depth {depth}"));
         assert!(together.counts.reflected.queries > 2000, "{:?}", together.counts.reflected);

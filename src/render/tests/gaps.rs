@@ -137,7 +137,8 @@ fn what_is_kept_once_for_many_places_has_the_same_gaps_in_all_of_them() {
     }
 }
 
-/// A card whose coordinates are made of huge numbers, or that is a sliver, seen from near: what is read there depends on roundings.
+/// A card whose coordinates are made of huge numbers, or that is a sliver, seen from near: what is read there depends on
+/// roundings.
 #[test]
 fn where_roundings_decide_what_is_read_nothing_is_passed_that_is_there() {
     for case in 0..3 {

@@ -145,7 +145,7 @@ fn a_spread_ray_stands_for_the_less_of_its_lobe_the_more_samples_a_pixel_may_hav
 #[test]
 fn what_lets_no_light_in_does_not_disperse_it() {
     for (metallic, transmission) in [(1.0, 1.0), (1.0, 0.0), (0.0, 0.0)] {
-        let of = |dispersion, everything| {
+        let of = |dispersion, no_prune| {
             let model = MetalRough {
                 metallic,
                 transmission,
@@ -158,7 +158,7 @@ fn what_lets_no_light_in_does_not_disperse_it() {
             let mut s = looking_down(5.0);
             s.square(0.0, 9.0, rough(model));
             s.scene.environment = Environment::Constant(Vec3::ONE);
-            (s.settings.samples, s.settings.gloss_rays, s.settings.everything) = (16, Some(4), everything);
+            (s.settings.samples, s.settings.gloss_rays, s.settings.no_prune) = (16, Some(4), no_prune);
             s.color()
         };
         assert_near(of(5.0, false), of(0.0, false), 1e-6);

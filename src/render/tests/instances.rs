@@ -110,13 +110,13 @@ fn what_is_known_to_stop_light_changes_no_bit() {
         let (kept, _) = rendered(&stage, Instancing::Keep, AccelKind::FastOctree);
         assert!(kept.picture == flat.picture, "kept, {sampling:?}");
 
-        let world = world.clone().with_everything();
+        let world = world.clone().without_pruning();
         let (accel, _) = world.structure(AccelChoice::Kind(AccelKind::FastOctree), &AccelParams::DEFAULT);
-        let textures = TextureStore::new(&stage.scene).with_everything();
-        let settings = &Settings { everything: true, ..stage.settings };
+        let textures = TextureStore::new(&stage.scene).without_pruning();
+        let settings = &Settings { no_prune: true, ..stage.settings };
         let (scene, view) = (&stage.scene, &stage.view);
         let job = Job { scene, world: &world, accel: &accel, textures: &textures, view, settings };
-        assert!(render_counted(&job, &()).picture == flat.picture, "everything, {sampling:?}");
+        assert!(render_counted(&job, &()).picture == flat.picture, "without pruning, {sampling:?}");
     }
 }
 

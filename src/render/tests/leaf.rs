@@ -1,7 +1,7 @@
 //! Light that is scattered through thin surfaces.
 
 use super::*;
-use crate::scene::{Environment, MetalRough, Translucence};
+use crate::scene::{DiffuseTransmission, Environment, MetalRough};
 
 const BASE: Vec3 = Vec3::new(0.8, 0.4, 0.2);
 const THROUGH: Vec3 = Vec3::new(0.1, 0.9, 0.3);
@@ -10,9 +10,9 @@ const SHARE: f32 = 0.25;
 
 /// A surface that reflects nothing at its face, so that all light is scattered.
 fn leaf(share: f32) -> Material {
-    let translucence =
-        (share > 0.0).then(|| Box::new(Translucence { share, share_map: None, color: THROUGH, color_map: None }));
-    let dull = MetalRough { metallic: 0.0, specular: 0.0, translucence, ..MetalRough::default() };
+    let diffuse_transmission = (share > 0.0)
+        .then(|| Box::new(DiffuseTransmission { share, share_map: None, color: THROUGH, color_map: None }));
+    let dull = MetalRough { metallic: 0.0, specular: 0.0, diffuse_transmission, ..MetalRough::default() };
     Material { base_color: BASE, double_sided: true, reflection: Reflection::MetalRough(dull), ..Material::default() }
 }
 

@@ -1,15 +1,15 @@
 //! Whole small pictures with analytic answers.
 
-mod around;
 mod bits;
+mod coat;
 mod costs;
+mod environment_rays;
 mod gaps;
-mod glare;
 mod glass;
 mod glints;
 mod gloss;
+mod hotspot;
 mod instances;
-mod lacquer;
 mod leaf;
 mod light;
 mod mirrors;

@@ -154,7 +154,7 @@ fn one_by_one_and_side_by_side_round_surfaces_get_the_same_light() {
         s.mesh(ball(9, 4), DAffine3::from_translation(DVec3::new(1.2, 0.3, 0.4)), matt());
         s.lamp(DVec3::new(1.5, 2.0, 0.8), 1.0);
         let together = s.render().picture.beauty;
-        s.settings.everything = true;
+        s.settings.no_prune = true;
         assert!(together == s.render().picture.beauty, "{to_sun}");
     }
 }

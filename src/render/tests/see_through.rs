@@ -354,7 +354,7 @@ fn light_through_holes_is_what_is_left_when_every_surface_is_asked() {
     for alpha_mode in [AlphaMode::Mask { cutoff: 0.5 }, AlphaMode::Blend] {
         for magnify in [Filter::Nearest, Filter::Linear] {
             let s = sheets(alpha_mode, magnify);
-            let asked = with_everything(&s);
+            let asked = without_pruning(&s);
             for instances in [Instancing::Flatten, Instancing::Keep] {
                 let world = World::placing(&s.scene, instances);
                 assert!(world.instanced.is_empty() == (instances == Instancing::Flatten));
@@ -381,7 +381,7 @@ fn light_through_more_than_is_noted_at_once_is_what_is_left_all_the_same() {
         layers.triangles.extend(layer.triangles.iter().map(|t| t.map(|corner| corner + 4 * i)));
     }
     s.mesh(layers, DAffine3::IDENTITY, blended(Vec3::ZERO, 1e-3));
-    let (rendered, asked) = (s.render(), with_everything(&s));
+    let (rendered, asked) = (s.render(), without_pruning(&s));
     assert!(rendered.picture == asked.picture);
     assert!(rendered.picture.beauty[0][0] > 0.1, "{:?}", rendered.picture.beauty);
     let [one, many] = [&rendered, &asked].map(|r| r.counts.shadow.queries);
@@ -389,11 +389,11 @@ fn light_through_more_than_is_noted_at_once_is_what_is_left_all_the_same() {
 }
 
 /// With every surface asked what it lets through.
-fn with_everything(s: &Stage) -> Rendered {
-    let world = World::new(&s.scene).with_everything();
+fn without_pruning(s: &Stage) -> Rendered {
+    let world = World::new(&s.scene).without_pruning();
     let accel = AnyAccel::build(AccelKind::DEFAULT, &world.shapes, &AccelParams::DEFAULT);
-    let textures = TextureStore::new(&s.scene).with_everything();
-    let settings = &Settings { everything: true, ..s.settings.clone() };
+    let textures = TextureStore::new(&s.scene).without_pruning();
+    let settings = &Settings { no_prune: true, ..s.settings.clone() };
     let (scene, view) = (&s.scene, &s.view);
     render_counted(&Job { scene, world: &world, accel: &accel, textures: &textures, view, settings }, &())
 }
@@ -415,14 +415,14 @@ fn opaque_scenes_send_the_same_rays_by_chance_when_everything_is_done() {
     s.settings.sampling = Sampling::Stochastic(how);
     let world = World::new(&s.scene);
     assert!(world.is_opaque());
-    assert!(with_everything(&s).picture == s.render().picture);
+    assert!(without_pruning(&s).picture == s.render().picture);
 }
 
 #[test]
 fn the_opacity_that_shadow_rays_read_is_that_of_a_point_that_is_seen() {
     use crate::math::Vec4;
     use crate::render::shade::{Reader, shadow_filter};
-    use crate::render::surface::Target;
+    use crate::render::surface::HitPrim;
     use crate::scene::Wrap;
     let mut random = Random::new(17);
     let mut seen = 0;
@@ -459,7 +459,7 @@ fn the_opacity_that_shadow_rays_read_is_that_of_a_point_that_is_seen() {
         for _ in 0..50 {
             let (u, v) = (random.unit() * 0.5, random.unit() * 0.5);
             let hit = crate::accel::Hit { t: 1.0, u, v, prim: random.below(2) as u32 };
-            let target = Target::new(&s.scene, &world, hit.prim);
+            let target = HitPrim::new(&s.scene, &world, hit.prim);
             let patch = target.patch(&world, u, v, Vec3::ZERO);
             let reader = Reader { store: &store, patch: patch.as_ref(), known: &[] };
             let opacity = target.opacity(&hit, &store).expect("a triangle");

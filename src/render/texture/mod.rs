@@ -1,4 +1,4 @@
-//! HitQueries up textures: wrap, filter, and the right sharpness for the size of a pixel.
+//! Looking up textures: wrap, filter, and the right sharpness for the size of a pixel.
 //!
 //! Bitmaps stay as they were stored; texels are decoded when read (`decode`), and smaller copies exist only once a lookup
 //! needs them (`pyramid`). A footprint longer than wide is covered by several probes along its longer axis, the way of
@@ -89,10 +89,10 @@ impl<'a> TextureStore<'a> {
         Self { textures: &scene.textures, bitmaps: bitmaps.collect(), stand_in: None, surveys: Surveys::default() }
     }
 
-    /// The same, in which maps that are not there are read, too, for nothing (see [`everything`](super::everything)).
+    /// The same, in which maps that are not there are read, too, for nothing (see [`no_prune`](super::everything)).
     #[must_use]
-    pub fn with_everything(self) -> Self {
-        Self { stand_in: Some(Source::new(&super::everything::GREY)), ..self }
+    pub fn without_pruning(self) -> Self {
+        Self { stand_in: Some(Source::new(&super::no_prune::GREY)), ..self }
     }
 
     /// Columns and rows of a texture's bitmap; (1, 1) for a texture that does not exist.

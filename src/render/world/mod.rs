@@ -110,8 +110,9 @@ impl World {
         Placing::new(scene, how).world()
     }
 
-    /// A structure over everything, and the reason where there was a choice. Where anything is instanced, kinds that cannot hold it
-    /// give way to `fast-octree`, as [`AnyAccel::kind`] tells: to compare structures, keep nothing ([`World::new`]).
+    /// A structure over everything, and the reason where there was a choice. Where anything is instanced, kinds that cannot
+    /// hold it give way to `fast-octree`, as [`AnyAccel::kind`] tells: to compare structures, keep nothing
+    /// ([`World::new`]).
     ///
     /// # Panics
     ///
@@ -209,9 +210,9 @@ impl World {
         self.prim(hit.prim).refine(ray, hit)
     }
 
-    /// The same, in which no prim is opaque: each is asked what light it lets through (see [`everything`](super::everything)).
+    /// The same, in which no prim is opaque: each is asked what light it lets through (see [`no_prune`](super::everything)).
     #[must_use]
-    pub fn with_everything(mut self) -> Self {
+    pub fn without_pruning(mut self) -> Self {
         self.shapes.opaque = BitSet::filled(self.shapes.len(), false);
         self.instanced.open_all();
         self

@@ -91,7 +91,7 @@ pub(super) struct Part {
 
 /// Which parts are looked at.
 #[derive(Clone, Copy)]
-pub(super) enum Grain<'a> {
+pub(super) enum Anisotropy<'a> {
     /// Each face.
     Faces,
     /// Each face, but instances that are small in these bounds as one.
@@ -99,7 +99,11 @@ pub(super) enum Grain<'a> {
 }
 
 /// Box of the parts that `keep` wants; `None` when there are none.
-pub(super) fn hull(scene: &Scene, grain: Grain, keep: impl Fn(&Part) -> bool + Sync) -> Option<(DVec3, DVec3)> {
+pub(super) fn hull(
+    scene: &Scene,
+    anisotropy: Anisotropy,
+    keep: impl Fn(&Part) -> bool + Sync,
+) -> Option<(DVec3, DVec3)> {
     let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let join = |all: &mut (DVec3, DVec3), more: (DVec3, DVec3)| *all = (all.0.min(more.0), all.1.max(more.1));
     let add = |all: &mut (DVec3, DVec3), part: &Part| {
@@ -107,7 +111,7 @@ pub(super) fn hull(scene: &Scene, grain: Grain, keep: impl Fn(&Part) -> bool + S
             join(all, (part.lo, part.hi));
         }
     };
-    let (lo, hi) = gather((scene, grain), nothing, add, join);
+    let (lo, hi) = gather((scene, anisotropy), nothing, add, join);
     lo.cmple(hi).all().then_some((lo, hi))
 }
 
@@ -116,7 +120,7 @@ pub(super) const CHUNK: usize = 1 << 15;
 
 /// Adds up every face, sphere and cone with finite corners, from `nothing`; `join` adds what others have added up.
 pub(super) fn gather<T: Send>(
-    (scene, grain): (&Scene, Grain),
+    (scene, anisotropy): (&Scene, Anisotropy),
     nothing: impl Fn() -> T + Sync,
     add: impl Fn(&mut T, &Part) + Sync,
     join: impl Fn(&mut T, T),
@@ -124,7 +128,7 @@ pub(super) fn gather<T: Send>(
     let mut all = nothing();
     for instance in &scene.instances {
         let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
-        if let Grain::Crowd(crowd, bounds) = grain
+        if let Anisotropy::Crowd(crowd, bounds) = anisotropy
             && let Some(part) = crowd.part(instance, bounds)
         {
             add(&mut all, &part);

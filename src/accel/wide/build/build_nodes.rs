@@ -12,8 +12,8 @@ const PIECE: usize = 256;
 #[derive(Clone, Copy, Debug, Zeroable)]
 pub(super) struct BuildNode {
     pub lo: Vec3,
-    /// Of a leaf the first of its prims, in the end the packed child that it is; of another build node how many build nodes further on
-    /// its second side is.
+    /// Of a leaf the first of its prims, in the end the packed child that it is; of another build node how many build nodes
+    /// further on its second side is.
     pub at: u32,
     pub hi: Vec3,
     /// Prims of a leaf; 0: no leaf.

@@ -1,10 +1,10 @@
 //! From a binary tree to nodes of eight.
 //!
-//! Which build nodes become nodes is chosen so that they cost the least: for every build node it is known what it costs to stand for
-//! everything below it by one child of a node, by two, and so on; a node takes what eight cost least. After H. Ylitie,
-//! T. Karras, S. Laine, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*, 2017. What a node costs is
-//! the chance that a ray enters it: of one that comes from afar the area of its box, of one that starts or ends at a shape
-//! the part of all shapes that are below it.
+//! Which build nodes become nodes is chosen so that they cost the least: for every build node it is known what it costs to
+//! stand for everything below it by one child of a node, by two, and so on; a node takes what eight cost least. After H.
+//! Ylitie, T. Karras, S. Laine, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*, 2017. What a
+//! node costs is the chance that a ray enters it: of one that comes from afar the area of its box, of one that starts or
+//! ends at a shape the part of all shapes that are below it.
 
 use std::ops::Range;
 
@@ -158,8 +158,8 @@ impl Children {
 }
 
 impl Collapse<'_> {
-    /// Adds the node of a build node, the first of these, below so many nodes, and those below it that stand for more than `largest`
-    /// build nodes; lists the others.
+    /// Adds the node of a build node, the first of these, below so many nodes, and those below it that stand for more than
+    /// `largest` build nodes; lists the others.
     fn top(
         &self,
         build_nodes: Range<usize>,

@@ -169,8 +169,8 @@ struct Leaves {
 }
 
 impl Leaves {
-    /// Lists the leaves among `build_nodes`, over prims of which the first `triangles` are triangles. Each then has the child that it
-    /// is, packed, in place of its first prim.
+    /// Lists the leaves among `build_nodes`, over prims of which the first `triangles` are triangles. Each then has the
+    /// child that it is, packed, in place of its first prim.
     fn list(build_nodes: &mut [BuildNode], triangles: u32) -> Self {
         let count = |chunk: &[BuildNode]| {
             let leaves = chunk.iter().filter(|build_node| build_node.is_leaf());

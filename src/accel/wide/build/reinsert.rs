@@ -27,8 +27,8 @@ const SHARE: usize = 32;
 const MOST: usize = 4096;
 const FEW: usize = 16;
 
-/// The part of its own area that counts against what taking a build node out can save. All of it comes back wherever the build node
-/// goes; but boxes further up may shrink, too.
+/// The part of its own area that counts against what taking a build node out can save. All of it comes back wherever the
+/// build node goes; but boxes further up may shrink, too.
 const RETURNS: f32 = 0.75;
 
 /// A binary tree with links.
@@ -74,8 +74,8 @@ pub(super) fn improve(build_nodes: Vec<BuildNode>) -> (Vec<BuildNode>, Option<us
 
 /// The build nodes that may be tried, by falling promise.
 ///
-/// Cuts leave small build nodes alone with large ones, in boxes much larger than they are, and what is saved by taking a build node out
-/// is that box.
+/// Cuts leave small build nodes alone with large ones, in boxes much larger than they are, and what is saved by taking a
+/// build node out is that box.
 fn promising(build_nodes: &[BuildNode]) -> Vec<(f32, u32)> {
     // All but the root.
     let count = build_nodes.len().saturating_sub(1);

@@ -252,9 +252,10 @@ fn illum_0_is_constant_only_literally() {
 fn sheen_clear_coat_and_anisotropy_are_drawn() {
     let (material, warnings) = guess("Kd 1 1 1\nPr 0.2\nPs 0.4\nPc 0.5\nPcr 0.6\naniso 0.7\nanisor 0.25");
     let Reflection::MetalRough(m) = &material.reflection else { panic!("physically based") };
-    let (sheen, coat, grain) = (m.sheen.as_ref().unwrap(), m.coat.as_ref().unwrap(), m.grain.as_ref().unwrap());
+    let (sheen, coat, anisotropy) =
+        (m.sheen.as_ref().unwrap(), m.coat.as_ref().unwrap(), m.anisotropy.as_ref().unwrap());
     assert_eq!((sheen.color, coat.strength, coat.roughness), (Vec3::splat(0.4), 0.5, 0.6));
-    assert_eq!((grain.strength, grain.rotation), (0.7, std::f32::consts::FRAC_PI_2));
+    assert_eq!((anisotropy.strength, anisotropy.rotation), (0.7, std::f32::consts::FRAC_PI_2));
     assert!(warnings.is_empty(), "{warnings:?}");
     let (plain, _) = guess("Pr 0.2\nPs 0\nPc 0\nPcr 0.03\naniso 0\nanisor 0");
     let Reflection::MetalRough(m) = &plain.reflection else { panic!("physically based") };

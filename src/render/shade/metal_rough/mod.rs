@@ -12,12 +12,12 @@
 
 use super::facets::{AlbedoRow, albedo, mean_albedo, rebound};
 use super::highlight::{NARROWEST_HIGHLIGHT, highlight, is_narrow, least_square, squared_width};
-use super::{Balance, GrainMatter, Lobe, Reader, Seen, Sky, film};
+use super::{AnisotropicLobe, BounceWeights, Lobe, Reader, ShadingFrame, Sky, iridescence};
 use crate::math::formula::{exp2, root, smoothstep};
 use crate::math::{Vec3, Vec4};
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, transmittance};
 use crate::render::wave::Crossing;
-use crate::scene::{Film, MetalRough, Translucence};
+use crate::scene::{DiffuseTransmission, Iridescence, MetalRough};
 use std::f32::consts::PI;
 
 /// Below this roughness the surroundings are seen by a ray alone …
@@ -30,7 +30,7 @@ const FROSTED_ROUGHNESS: f32 = 0.6;
 const FROSTED_SHARE: f32 = 0.75;
 /// The model's parameters at one point.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct MetalRoughMatter {
+pub(crate) struct MetalRoughBsdf {
     base: Vec3,
     metallic: f32,
     roughness: f32,
@@ -64,7 +64,7 @@ pub(crate) struct MetalRoughMatter {
 
 /// Those of its parameters that maps of its colour, roughness, metalness, occlusion and transmission change.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct MetalRoughPaint {
+pub(crate) struct MetalRoughInputs {
     pub base: Vec3,
     pub metallic: f32,
     pub roughness: f32,
@@ -72,7 +72,7 @@ pub(crate) struct MetalRoughPaint {
     pub transmission: f32,
 }
 
-impl MetalRoughPaint {
+impl MetalRoughInputs {
     /// From the base colour, the share of the surroundings that is open, and what the maps say of roughness and metalness, and
     /// of light that is let through.
     #[inline(always)]
@@ -89,7 +89,7 @@ impl MetalRoughPaint {
 
 /// What a point sees of its surroundings.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Around {
+pub(crate) struct EnvironmentTerms {
     /// Cosine of the view, 0 … 1.
     pub n_v: f32,
     /// The lobe's albedo: shares of f0 and f90.
@@ -119,12 +119,12 @@ fn inside(m: &MetalRough, reader: &Reader) -> Vec3 {
     transmittance(m.absorption, m.thickness * reader.linear(m.thickness_map.as_ref()).y)
 }
 
-impl MetalRoughMatter {
+impl MetalRoughBsdf {
     pub(super) fn new(m: &MetalRough, base: Vec3, occlusion: f32, reader: &Reader) -> Self {
         let maps = [&m.metal_rough_map, &m.transmission_map].map(|map| reader.linear(map.as_ref()));
-        let paint = MetalRoughPaint::of(m, base, occlusion, maps.into());
-        let MetalRoughPaint { base, metallic, roughness, occlusion, transmission } = paint;
-        let mut matter = Self {
+        let inputs = MetalRoughInputs::of(m, base, occlusion, maps.into());
+        let MetalRoughInputs { base, metallic, roughness, occlusion, transmission } = inputs;
+        let mut bsdf = Self {
             base,
             metal_f0: base,
             filmed: false,
@@ -145,8 +145,8 @@ impl MetalRoughMatter {
             dispersion: m.dispersion,
             least_square: 0.0,
         };
-        matter.tint(m, reader);
-        matter
+        bsdf.tint(m, reader);
+        bsdf
     }
 
     /// Gives the dielectric part the reflectance that factors and maps say.
@@ -159,22 +159,23 @@ impl MetalRoughMatter {
     }
 
     /// The numbers that maps have said.
-    pub(crate) fn paint(&self) -> MetalRoughPaint {
+    pub(crate) fn inputs(&self) -> MetalRoughInputs {
         let Self { base, metallic, roughness, occlusion, transmission, .. } = *self;
-        MetalRoughPaint { base, metallic, roughness, occlusion, transmission }
+        MetalRoughInputs { base, metallic, roughness, occlusion, transmission }
     }
 
     /// The same with other numbers of maps, where no film is over it.
     #[inline(always)]
-    pub(crate) fn painted(&self, paint: MetalRoughPaint) -> Self {
-        let MetalRoughPaint { base, metallic, roughness, occlusion, transmission } = paint;
+    pub(crate) fn painted(&self, inputs: MetalRoughInputs) -> Self {
+        let MetalRoughInputs { base, metallic, roughness, occlusion, transmission } = inputs;
         Self { base, metal_f0: base, metallic, roughness, occlusion, transmission, ..*self }
     }
 
     /// Lets it scatter light to its other side.
-    pub(super) fn thin(&mut self, translucence: &Translucence, reader: &Reader) {
-        let color = translucence.color * reader.srgb(translucence.color_map.as_ref());
-        self.share = (translucence.share * reader.alpha(translucence.share_map.as_ref())).clamp(0.0, 1.0);
+    pub(super) fn thin(&mut self, diffuse_transmission: &DiffuseTransmission, reader: &Reader) {
+        let color = diffuse_transmission.color * reader.srgb(diffuse_transmission.color_map.as_ref());
+        self.share =
+            (diffuse_transmission.share * reader.alpha(diffuse_transmission.share_map.as_ref())).clamp(0.0, 1.0);
         self.through = color.clamp(Vec3::ZERO, Vec3::ONE);
     }
 
@@ -184,14 +185,14 @@ impl MetalRoughMatter {
     }
 
     /// Puts it under a film, as seen from the outside at this cosine.
-    pub(super) fn cover(&mut self, film: &Film, cosine: f32, reader: &Reader) {
-        let strength = (film.strength * reader.linear(film.strength_map.as_ref()).x).clamp(0.0, 1.0);
-        let [thin, thick] = film.thickness;
-        let thickness = thin + (thick - thin) * reader.linear(film.thickness_map.as_ref()).y;
+    pub(super) fn cover(&mut self, iridescence: &Iridescence, cosine: f32, reader: &Reader) {
+        let strength = (iridescence.strength * reader.linear(iridescence.strength_map.as_ref()).x).clamp(0.0, 1.0);
+        let [thin, thick] = iridescence.thickness;
+        let thickness = thin + (thick - thin) * reader.linear(iridescence.thickness_map.as_ref()).y;
         if strength > 0.0 && thickness > 0.0 {
             let under = |f0: Vec3| {
-                let share = film::reflectance(film.ior, thickness, f0, cosine);
-                f0.lerp(film::seen_face_on(share, cosine), strength)
+                let share = iridescence::reflectance(iridescence.ior, thickness, f0, cosine);
+                f0.lerp(iridescence::seen_face_on(share, cosine), strength)
             };
             // A part of which there is nothing needs no colours.
             if self.metallic < 1.0 {
@@ -205,9 +206,9 @@ impl MetalRoughMatter {
     }
 
     /// Gives it a grain, which `view` sees on this normal.
-    pub(super) fn brush(&mut self, grain: Option<&GrainMatter>, normal: Vec3, view: Vec3) {
-        if let Some(grain) = grain {
-            (self.roughness_along, self.sent_back) = (grain.roughness(), grain.lobe(normal).albedo(view));
+    pub(super) fn brush(&mut self, anisotropy: Option<&AnisotropicLobe>, normal: Vec3, view: Vec3) {
+        if let Some(anisotropy) = anisotropy {
+            (self.roughness_along, self.sent_back) = (anisotropy.roughness(), anisotropy.lobe(normal).albedo(view));
         }
     }
 
@@ -345,12 +346,18 @@ impl MetalRoughMatter {
     }
 
     /// The surroundings without a ray: scattered and looked-up mirrored light, and what is looked up through frosted glass.
-    pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3, grain: Option<&GrainMatter>) -> [Vec3; 2] {
+    pub(super) fn ambient(
+        &self,
+        seen: &ShadingFrame,
+        sky: &Sky,
+        ambient: Vec3,
+        anisotropy: Option<&AnisotropicLobe>,
+    ) -> [Vec3; 2] {
         let n_v = seen.normal.dot(seen.view).clamp(0.0, 1.0);
         let looked_up = self.traced(seen.outside) < 1.0;
         let roughness = self.mean_roughness();
-        let mirrored = || grain.map_or_else(|| sky.mirrored(seen, roughness), |g| g.mirrored(seen, sky));
-        let around = Around {
+        let mirrored = || anisotropy.map_or_else(|| sky.mirrored(seen, roughness), |g| g.mirrored(seen, sky));
+        let around = EnvironmentTerms {
             n_v,
             shares: self.albedo(n_v),
             diffuse: sky.diffuse(seen.normal) + ambient,
@@ -374,12 +381,12 @@ impl MetalRoughMatter {
     }
 
     /// BRDF × N·L of what [`Self::ambient`] looks up first.
-    pub(super) fn lit_around(&self, seen: &Seen, to: Vec3, grain: Option<&GrainMatter>) -> Vec3 {
+    pub(super) fn lit_around(&self, seen: &ShadingFrame, to: Vec3, anisotropy: Option<&AnisotropicLobe>) -> Vec3 {
         let (normal, view) = (seen.normal, seen.view);
         let looked_up = 1.0 - self.traced(seen.outside);
-        let lobe = |between| match grain {
+        let lobe = |between| match anisotropy {
             None => highlight(normal, between, [normal.dot(to), normal.dot(view)], squared_width(self.roughness)),
-            Some(grain) => grain.highlight(normal, view, to),
+            Some(anisotropy) => anisotropy.highlight(normal, view, to),
         };
         let through = if self.is_translucent() { self.lit_through(normal, view, to) } else { Vec3::ZERO };
         let left = 1.0 - self.turned_back(normal.dot(view), seen.outside);
@@ -414,7 +421,7 @@ impl MetalRoughMatter {
     /// What is scattered and mirrored of the surroundings, and the largest share that the dielectric part mirrors.
     /// `rebound` is what [`rebound`] gives for the material.
     #[inline(always)]
-    pub(crate) fn around(&self, around: &Around, rebound: Vec3) -> (Vec3, f32) {
+    pub(crate) fn around(&self, around: &EnvironmentTerms, rebound: Vec3) -> (Vec3, f32) {
         let looked_up = 1.0 - self.traced(around.outside);
         // Rays that are spread are lost between facets as light that is looked up is.
         let rough = if self.by_rays { 1.0 } else { looked_up };
@@ -451,7 +458,7 @@ impl MetalRoughMatter {
     }
 
     /// Weights of the mirror ray and of the ray that passes through, as seen from outside or not.
-    pub(super) fn balance(&self, cosine: f32, crossing: &Crossing, outside: bool) -> Balance {
+    pub(super) fn bounce_weights(&self, cosine: f32, crossing: &Crossing, outside: bool) -> BounceWeights {
         let (mut dielectric, metal) = self.fresnel(cosine);
         let mut open = 1.0 - dielectric.max_element();
         let inside = crossing.n_i > crossing.n_t;
@@ -468,7 +475,7 @@ impl MetalRoughMatter {
             }
             open = 1.0 - dielectric.max_element();
         }
-        Balance {
+        BounceWeights {
             reflected: self.mirrored(dielectric, metal, outside),
             glass: dielectric * (self.transmission * (1.0 - self.metallic) * self.traced(outside)),
             refracted: self.passed(open) * (1.0 - self.frosted(outside)),

@@ -1,8 +1,8 @@
 use super::*;
 use crate::render::wave::{Media, Medium};
 
-fn matter() -> MetalRoughMatter {
-    MetalRoughMatter {
+fn bsdf() -> MetalRoughBsdf {
+    MetalRoughBsdf {
         base: Vec3::new(0.8, 0.4, 0.2),
         metal_f0: Vec3::new(0.8, 0.4, 0.2),
         filmed: false,
@@ -31,7 +31,7 @@ fn at(degrees: f32) -> Vec3 {
 }
 
 /// ∫ BRDF N·L over the hemisphere by midpoints.
-fn reflected_in_all(m: &MetalRoughMatter, view: Vec3) -> Vec3 {
+fn reflected_in_all(m: &MetalRoughBsdf, view: Vec3) -> Vec3 {
     let (rows, columns) = (400u16, 200u16);
     let mut sum = Vec3::ZERO;
     for i in 0..rows {
@@ -49,8 +49,8 @@ fn reflected_in_all(m: &MetalRoughMatter, view: Vec3) -> Vec3 {
 #[test]
 fn the_tabulated_albedo_is_that_of_the_lobe() {
     for (roughness, degrees) in [(0.3, 0.0), (0.5, 45.0), (0.5, 80.0), (0.8, 60.0), (1.0, 20.0)] {
-        let white = MetalRoughMatter { f0: Vec3::ONE, base: Vec3::ZERO, roughness, ..matter() };
-        let black = MetalRoughMatter { f0: Vec3::ZERO, ..white };
+        let white = MetalRoughBsdf { f0: Vec3::ONE, base: Vec3::ZERO, roughness, ..bsdf() };
+        let black = MetalRoughBsdf { f0: Vec3::ZERO, ..white };
         let (sum, bias) = (reflected_in_all(&white, at(degrees)).x, reflected_in_all(&black, at(degrees)).x);
         let known = albedo(roughness, at(degrees).z);
         assert!((known.0 - (sum - bias)).abs() < 0.05, "{roughness} at {degrees}: {}, {known:?}", sum - bias);
@@ -63,7 +63,7 @@ fn no_more_light_leaves_than_arrives() {
     // Nearer to grazing the model itself gives off a little too much.
     for roughness in [0.2, 0.5, 1.0] {
         for degrees in [0.0, 30.0, 50.0] {
-            let white = MetalRoughMatter { base: Vec3::ONE, roughness, ..matter() };
+            let white = MetalRoughBsdf { base: Vec3::ONE, roughness, ..bsdf() };
             let all = reflected_in_all(&white, at(degrees)).max_element();
             assert!(all < 1.01, "{roughness} at {degrees}: {all}");
         }
@@ -72,21 +72,21 @@ fn no_more_light_leaves_than_arrives() {
 
 #[test]
 fn a_matt_dielectric_is_lambertian_but_for_its_sheen() {
-    let dull = MetalRoughMatter { f0: Vec3::ZERO, f90: 0.0, ..matter() };
+    let dull = MetalRoughBsdf { f0: Vec3::ZERO, f90: 0.0, ..bsdf() };
     assert!((dull.lit(Vec3::Z, at(-20.0), at(60.0)) - dull.base * 0.5 / PI).length() < 1e-6);
 }
 
 #[test]
 fn a_translucent_surface_shares_its_light_between_both_sides() {
     let through = Vec3::new(0.2, 0.9, 0.1);
-    let leaf = MetalRoughMatter { f0: Vec3::ZERO, f90: 0.0, share: 0.25, through, ..matter() };
+    let leaf = MetalRoughBsdf { f0: Vec3::ZERO, f90: 0.0, share: 0.25, through, ..bsdf() };
     let (front, back) = (leaf.lit(Vec3::Z, at(-20.0), at(60.0)), leaf.lit_through(Vec3::Z, at(-20.0), at(120.0)));
     assert!((front - leaf.base * (0.75 * 0.5 / PI)).length() < 1e-6);
     assert!((back - through * (0.25 * 0.5 / PI)).length() < 1e-6);
     assert_eq!(leaf.lit_through(Vec3::Z, at(-20.0), at(60.0)), Vec3::ZERO, "that is the front");
-    let metal = MetalRoughMatter { metallic: 1.0, ..leaf };
+    let metal = MetalRoughBsdf { metallic: 1.0, ..leaf };
     assert_eq!(metal.lit_through(Vec3::Z, at(-20.0), at(120.0)), Vec3::ZERO);
-    let glossy = MetalRoughMatter { f0: Vec3::splat(0.04), f90: 1.0, ..leaf };
+    let glossy = MetalRoughBsdf { f0: Vec3::splat(0.04), f90: 1.0, ..leaf };
     let (there, back) = (glossy.lit_through(Vec3::Z, at(25.0), at(130.0)) / 50f32.to_radians().cos(), {
         glossy.lit_through(Vec3::NEG_Z, at(130.0), at(25.0)) / 25f32.to_radians().cos()
     });
@@ -95,7 +95,7 @@ fn a_translucent_surface_shares_its_light_between_both_sides() {
 
 #[test]
 fn seen_and_lit_can_change_places() {
-    let m = MetalRoughMatter { metallic: 0.4, ..matter() };
+    let m = MetalRoughBsdf { metallic: 0.4, ..bsdf() };
     let (a, b) = (at(25.0), at(-65.0));
     let there = m.lit(Vec3::Z, a, b) / b.z;
     let back = m.lit(Vec3::Z, b, a) / a.z;
@@ -104,42 +104,42 @@ fn seen_and_lit_can_change_places() {
 
 #[test]
 fn a_mirror_of_metal_has_the_color_of_its_base() {
-    let metal = MetalRoughMatter { metallic: 1.0, roughness: 0.0, ..matter() };
+    let metal = MetalRoughBsdf { metallic: 1.0, roughness: 0.0, ..bsdf() };
     let outside = Media::default().cross(Medium { material: 0, ior: 1.0 }, true);
-    assert_eq!(metal.balance(1.0, &outside, true).reflected, metal.base);
-    assert_eq!(metal.balance(1.0, &outside, true).refracted, Vec3::ZERO);
-    assert_eq!(MetalRoughMatter { roughness: 0.5, ..metal }.balance(1.0, &outside, true).reflected, Vec3::ZERO);
+    assert_eq!(metal.bounce_weights(1.0, &outside, true).reflected, metal.base);
+    assert_eq!(metal.bounce_weights(1.0, &outside, true).refracted, Vec3::ZERO);
+    assert_eq!(MetalRoughBsdf { roughness: 0.5, ..metal }.bounce_weights(1.0, &outside, true).reflected, Vec3::ZERO);
 }
 
 #[test]
 fn clear_glass_splits_all_light_between_both_rays() {
-    let glass = MetalRoughMatter { base: Vec3::ONE, roughness: 0.0, transmission: 1.0, thick: true, ..matter() };
+    let glass = MetalRoughBsdf { base: Vec3::ONE, roughness: 0.0, transmission: 1.0, thick: true, ..bsdf() };
     let into = Media::default().cross(Medium { material: 0, ior: 1.5 }, true);
     let out = into.beyond.cross(Medium { material: 0, ior: 1.5 }, false);
     for (crossing, outside) in [(into, true), (out, false)] {
         for cosine in [0.1, 0.5, 0.8, 1.0] {
-            let balance = glass.balance(cosine, &crossing, outside);
-            assert!((balance.reflected + balance.refracted - Vec3::ONE).length() < 1e-6);
+            let bounce_weights = glass.bounce_weights(cosine, &crossing, outside);
+            assert!((bounce_weights.reflected + bounce_weights.refracted - Vec3::ONE).length() < 1e-6);
         }
     }
-    assert_eq!(glass.balance(0.1, &out, false).refracted, Vec3::ZERO, "total reflection");
+    assert_eq!(glass.bounce_weights(0.1, &out, false).refracted, Vec3::ZERO, "total reflection");
 }
 
 #[test]
 fn thick_glass_mirrors_in_the_colour_that_its_specular_factors_give() {
-    let glass = MetalRoughMatter { roughness: 0.0, transmission: 1.0, thick: true, ..matter() };
+    let glass = MetalRoughBsdf { roughness: 0.0, transmission: 1.0, thick: true, ..bsdf() };
     let into = Media::default().cross(Medium { material: 0, ior: 1.5 }, true);
-    let mirrored = |m: MetalRoughMatter, cosine| m.balance(cosine, &into, true).reflected;
+    let mirrored = |m: MetalRoughBsdf, cosine| m.bounce_weights(cosine, &into, true).reflected;
     for color in [Vec3::X, Vec3::ZERO, Vec3::new(0.5, 2.0, 1.0)] {
         let f0 = color * 0.04;
-        let tinted = MetalRoughMatter { f0, ..glass };
+        let tinted = MetalRoughBsdf { f0, ..glass };
         assert!((mirrored(tinted, 1.0) - f0).length() < 1e-6, "{color} face on");
         assert!((mirrored(tinted, 0.0) - Vec3::ONE).length() < 1e-6, "{color} grazing");
     }
     assert!((mirrored(glass, 0.3).x - fresnel_dielectric(0.3, 1.0, 1.5) as f32).abs() < 1e-6);
-    assert_eq!(mirrored(MetalRoughMatter { f0: Vec3::ZERO, f90: 0.0, ..glass }, 0.3), Vec3::ZERO);
-    let all = MetalRoughMatter { f0: Vec3::ONE, ior: 0.0, ..glass };
-    assert_eq!(all.balance(0.7, &Media::default().pass(), true).reflected, Vec3::ONE, "index 0");
+    assert_eq!(mirrored(MetalRoughBsdf { f0: Vec3::ZERO, f90: 0.0, ..glass }, 0.3), Vec3::ZERO);
+    let all = MetalRoughBsdf { f0: Vec3::ONE, ior: 0.0, ..glass };
+    assert_eq!(all.bounce_weights(0.7, &Media::default().pass(), true).reflected, Vec3::ONE, "index 0");
 }
 
 #[test]

@@ -1,0 +1,317 @@
+//! Many small scenes: several at a time, each on one thread.
+//!
+//! Much of what a small picture takes is no work for many threads: reading, parsing, encoding, writing, and all that waits
+//! for a disk. Where there are many of them, threads that have one each are all at work until the last. Pictures are the
+//! same bytes, and messages come as if one of these inputs had followed the other; larger inputs come after them.
+
+use super::exit::Exit;
+use super::interrupt;
+use super::job::{Batch, RenderJob, Shot};
+use super::message::Messages;
+use super::outputs::Target;
+use super::panics;
+use super::progress::Progress;
+use super::render::{self, SoFar};
+use crate::image::was_written_by_meshray;
+use crate::load::archive;
+use crate::load::is_called_a_model;
+use crate::render::Settings;
+use crate::threads;
+use rayon::ThreadPool;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Inputs for each lane at least: the last ones leave lanes idle.
+const MANY: usize = 4;
+
+/// Bytes of a small input at most. What is larger takes many threads well, and memory.
+const SMALL: u64 = 8 << 20;
+
+/// Pixels of a small picture at most.
+const PIXELS: u64 = 1 << 20;
+
+/// Files and folders beside a model that are looked at.
+const LOOKED_AT: usize = 100_000;
+
+/// How a run over inputs ended: as its worst, and how many failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Ended {
+    pub worst: Exit,
+    pub failed: usize,
+}
+
+impl Ended {
+    const WELL: Self = Self { worst: Exit::Done, failed: 0 };
+
+    fn and(&mut self, exit: Exit) {
+        self.worst = self.worst.max(exit);
+        self.failed += usize::from(exit != Exit::Done);
+    }
+}
+
+/// Renders all inputs, or as many as there are until a signal comes: those that are small side by side, where that pays, then the
+/// others one by one.
+pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, so_far: &mut SoFar) -> Ended {
+    let lanes = if may_go_side_by_side(job) { pool.current_num_threads() } else { 1 };
+    let (mut small, mut others) = (Vec::new(), Vec::new());
+    let mut sizes = Sizes { has_size: job.look.size.is_some(), beside: HashMap::new() };
+    for batch in &job.batches {
+        if lanes > 1 && sizes.are_small(batch) && spares_others(batch) { &mut small } else { &mut others }.push(batch);
+    }
+    let mut ended = Ended::WELL;
+    if small.len() >= MANY * lanes {
+        ended = side_by_side(job, &small, (lanes, pool), messages, so_far);
+    } else {
+        others = job.batches.iter().collect();
+    }
+    for batch in others {
+        if interrupt::raised() {
+            break;
+        }
+        let shots = render::writable_shots(job, batch, messages, so_far);
+        ended.and(guarded(job, batch, shots, pool, messages, so_far));
+    }
+    ended
+}
+
+/// Not where memory has a bound of its own, which is that of one scene, nor where times are wanted, what is done by a signal, or
+/// large pictures.
+fn may_go_side_by_side(job: &RenderJob) -> bool {
+    let usual = Settings::default();
+    let (width, height) = job.look.size.unwrap_or((usual.width, usual.height));
+    let times = job.profile || job.stats.is_some() || !job.heatmaps.is_empty() || !job.look.costs.is_empty();
+    let small = u64::from(width) * u64::from(height) <= PIXELS;
+    small && !(job.bounded || times || job.dry_run || job.keep_partial || job.again.is_some())
+}
+
+/// How large inputs are.
+struct Sizes {
+    /// Whether the size of their pictures was typed; NFF files say one themselves, which is known when they are read.
+    has_size: bool,
+    /// What lies beside models, folder by folder.
+    beside: HashMap<PathBuf, Option<u64>>,
+}
+
+impl Sizes {
+    /// Whether what a scene is read from is small: a file that holds all, or one with its share of all that lies beside it and in
+    /// the folders there, since it may name any of that.
+    fn are_small(&mut self, batch: &Batch) -> bool {
+        let mut length = |input: &PathBuf| {
+            let kind = input.extension()?.to_str()?.to_ascii_lowercase();
+            // Of what is unpacked it has its share; what is not there is soon said.
+            let Ok(file) = input.metadata() else {
+                return Some(archive::in_archive(input).ok().flatten().map_or(0, |(archive, _)| archive.share()));
+            };
+            let own = file.is_file().then_some(file.len())?;
+            match kind.as_str() {
+                "glb" | "ply" | "stl" => Some(own),
+                "zip" => archive::opened(input).ok().flatten().map(|archive| archive.share()),
+                "nff" => self.has_size.then_some(own),
+                "gltf" | "obj" => {
+                    let folder = input.parent()?;
+                    Some(own + (*self.beside.entry(folder.to_path_buf()).or_insert_with(|| beside(folder)))?)
+                }
+                _ => None,
+            }
+        };
+        batch.inputs.iter().map(&mut length).sum::<Option<u64>>().is_some_and(|bytes| bytes <= SMALL)
+    }
+}
+
+/// Bytes of what lies in a folder and in those in it beside models, for each model; `None` where that is much to look at.
+fn beside(folder: &Path) -> Option<u64> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let (mut bytes, mut models, mut looked_at, mut left) = (0, 0, 0, vec![(folder.to_path_buf(), true)]);
+    while let Some((folder, is_own)) = left.pop() {
+        for entry in folder.read_dir().ok()? {
+            let entry = entry.ok()?;
+            looked_at += 1;
+            if looked_at > LOOKED_AT {
+                return None;
+            }
+            let (path, metadata) = (entry.path(), entry.metadata().ok()?);
+            if metadata.is_dir() && is_own {
+                left.push((path, false));
+            } else if is_called_a_model(&path) {
+                models += u64::from(is_own);
+            } else if metadata.is_file() {
+                bytes += metadata.len();
+            }
+        }
+    }
+    Some(bytes / models.max(1))
+}
+
+/// Whether its pictures replace nothing but pictures of ours: what another input reads is not known before that is loaded. Under
+/// names that are made up they never do.
+fn spares_others(batch: &Batch) -> bool {
+    batch.shots.iter().all(|shot| match &shot.target {
+        Target::Named(path) => !path.exists() || was_written_by_meshray(path),
+        Target::Default(_) | Target::Stdout => true,
+    })
+}
+
+/// Pictures of a scene that may be written, and how what was found out about the others ends.
+type Writable<'a> = (Vec<&'a Shot>, Exit);
+
+/// Renders the pictures of a scene; an accident ends these alone.
+fn guarded(
+    job: &RenderJob,
+    batch: &Batch,
+    (shots, worst): Writable,
+    pool: &ThreadPool,
+    messages: &Messages,
+    so_far: &mut SoFar,
+) -> Exit {
+    let name = batch.inputs[0].display().to_string();
+    let work = || pool.install(|| render::render_batch(job, batch, &shots, messages, so_far));
+    worst.max(panics::guard(&name, messages, work))
+}
+
+fn side_by_side(
+    job: &RenderJob,
+    batches: &[&Batch],
+    (lanes, pool): (usize, &ThreadPool),
+    messages: &Messages,
+    so_far: &mut SoFar,
+) -> Ended {
+    let progress = Progress::new(&format!("{} inputs", batches.len()), messages, job.quiet, false);
+    progress.begin("rendering");
+    let waiting = batches.iter().map(|_| None).collect();
+    let state = State { next: 0, finished: 0, told: 0, waiting, so_far, ended: Ended::WELL };
+    let queue = Queue { job, batches, messages, progress, state: Mutex::new(state) };
+    std::thread::scope(|scope| {
+        for _ in 0..lanes {
+            let lane = || threads::pool(1).map_or((), |pool| queue.work(&pool));
+            // Where the system starts no more threads there are fewer lanes.
+            if std::thread::Builder::new().spawn_scoped(scope, lane).is_err() {
+                break;
+            }
+        }
+    });
+    // And where it starts none, this one does it all.
+    queue.work(pool);
+    queue.end()
+}
+
+/// The inputs that wait for a lane.
+struct Queue<'a, 's> {
+    job: &'a RenderJob,
+    batches: &'a [&'a Batch],
+    messages: &'a Messages,
+    progress: Progress<'a>,
+    state: Mutex<State<'s>>,
+}
+
+struct State<'s> {
+    /// The input that the next free lane takes.
+    next: usize,
+    /// How many are done with.
+    finished: usize,
+    /// Of so many from the first on all was told.
+    told: usize,
+    /// What came of others, until those before them are told.
+    waiting: Vec<Option<Finished>>,
+    so_far: &'s mut SoFar,
+    ended: Ended,
+}
+
+/// What came of an input.
+struct Finished {
+    messages: Messages,
+    so_far: SoFar,
+    exit: Exit,
+}
+
+impl<'a, 's> Queue<'a, 's> {
+    fn state(&self) -> MutexGuard<'_, State<'s>> {
+        // What a lane changes it changes as a whole.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What a lane does.
+    fn work(&self, pool: &ThreadPool) {
+        while !interrupt::raised() {
+            let Some((number, messages, shots, mut so_far)) = self.take() else { break };
+            let exit = guarded(self.job, self.batches[number], shots, pool, &messages, &mut so_far);
+            self.put(number, Finished { messages, so_far, exit });
+        }
+    }
+
+    /// The next input, with messages of its own. Whether its pictures may be written is asked in the order of inputs.
+    fn take(&self) -> Option<(usize, Messages, Writable<'a>, SoFar)> {
+        let mut state = self.state();
+        let number = state.next;
+        let batch = *self.batches.get(number)?;
+        state.next += 1;
+        let messages = self.messages.apart();
+        let shots = render::writable_shots(self.job, batch, &messages, state.so_far);
+        let own = state.so_far.of_one();
+        Some((number, messages, shots, own))
+    }
+
+    fn put(&self, number: usize, finished: Finished) {
+        let mut state = self.state();
+        state.finished += 1;
+        state.waiting[number] = Some(finished);
+        loop {
+            let turn = state.told;
+            let Some(finished) = state.waiting.get_mut(turn).and_then(Option::take) else { break };
+            state.told += 1;
+            self.tell(&mut state, finished);
+        }
+        self.progress.advance(state.finished, self.batches.len());
+    }
+
+    fn tell(&self, state: &mut State, Finished { messages, so_far, exit }: Finished) {
+        self.messages.tell(&messages);
+        state.so_far.add(so_far);
+        state.ended.and(exit);
+    }
+
+    /// Tells what was finished behind inputs that a signal has kept from being so.
+    fn end(self) -> Ended {
+        self.progress.finish();
+        let mut state = self.state();
+        for finished in state.waiting.iter_mut().filter_map(Option::take).collect::<Vec<_>>() {
+            self.tell(&mut state, finished);
+        }
+        state.ended
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn small_is_what_a_model_may_read_and_not_its_own_file_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        let of = |name: &str, has_size: bool| {
+            let batch = Batch { inputs: vec![dir.path().join(name)], shots: Vec::new() };
+            Sizes { has_size, beside: HashMap::new() }.are_small(&batch)
+        };
+        let small = |name: &str| of(name, true);
+        let write = |name: &str, bytes: u64| {
+            let path = dir.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::File::create(path).unwrap().set_len(bytes).unwrap();
+        };
+        write("own/a.nff", 10);
+        assert_eq!((of("own/a.nff", true), of("own/a.nff", false)), (true, false), "it says how large its picture is");
+        for name in ["lone/a.gltf", "pair/a.obj", "pair/b.obj", "deep/a.gltf", "own/a.glb"] {
+            write(name, 10);
+        }
+        write("lone/a.bin", SMALL);
+        write("pair/all.png", SMALL);
+        write("deep/maps/a.png", SMALL - 10);
+        write("deep/maps/deeper/a.png", SMALL);
+        write("own/a.bin", SMALL);
+        write("own/large.glb", SMALL + 1);
+        write("own/a.toml", 10);
+        assert!(!small("lone/a.gltf") && small("pair/a.obj") && small("deep/a.gltf") && small("own/a.glb"));
+        assert!(!small("own/large.glb") && !small("own/a.toml") && !small("-") && small("gone.obj"));
+    }
+}

@@ -1,0 +1,194 @@
+//! Rays from rough surfaces to the hotspot of a panorama.
+//!
+//! Of the rays that a rough surface spreads few would meet a sun, each far too bright. So for each of them another is sent
+//! to where the hotspot is, with the light that facets turn from there to the viewer, and what is spread sees the rest of
+//! the sky (P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo Techniques for Direct Lighting Calculations", 1996). Facets
+//! that let light through bend it as in B. Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet Models for
+//! Refraction through Rough Surfaces" (2007).
+
+use super::branch::{PathVertex, Rough, ShadingPoint};
+use super::context::Context;
+use super::draws::Purpose;
+use super::observer::Observer;
+use super::optics::reflect;
+use super::shade::{Lobe, ShadingFrame, above};
+use super::wave::{Crossing, Media, RayClass};
+use super::whitted::Tracer;
+use crate::accel::Accel;
+use crate::math::Vec3;
+
+/// Of which rays that a surface spreads the hotspot was asked for itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct HotspotSampled {
+    pub mirrored: bool,
+    pub through: bool,
+}
+
+impl HotspotSampled {
+    /// Of those that go on in empty space, unless it is not the sky that they see there. Between the walls of glass they
+    /// are turned again before they leave it.
+    fn of<G: ShadingPoint>(context: &Context, point: &PathVertex<G>, crossing: &Crossing, lobe: &Lobe) -> Self {
+        let is_outside = |media: &Media| media.innermost().is_none();
+        let sees_background = point.path.straight && crossing.n_i == crossing.n_t && !context.shows_environment;
+        match context.sky.hotspot() {
+            // What shows the whole sun or nothing of it needs no help.
+            Some(area) if lobe.solid_angle() > area => Self {
+                mirrored: is_outside(&point.path.media),
+                through: is_outside(&crossing.beyond) && !sees_background,
+            },
+            _ => Self::default(),
+        }
+    }
+}
+
+impl<A: Accel, P: Observer> Tracer<'_, A, P> {
+    /// Sends a ray to the hotspot for each that a surface spreads; of which of these that was done.
+    pub(super) fn ask_for_glare<G: ShadingPoint>(
+        &mut self,
+        point: &PathVertex<G>,
+        crossing: &Crossing,
+        rough: &Rough,
+    ) -> HotspotSampled {
+        let context = self.context;
+        let calm = HotspotSampled::of(context, point, crossing, &rough.lobe);
+        // Where colours are bent apart each has facets of its own.
+        if calm == HotspotSampled::default() || self.splits(point) {
+            return HotspotSampled::default();
+        }
+        let spread = self.draws(point, Purpose::Hotspot).spread(rough.rays);
+        let (seen, part) = (point.surface.seen(), 1.0 / rough.rays as f32);
+        for k in 0..rough.rays {
+            let Some((dir, radiance)) = context.sky.to_glare(spread.point(k)) else { continue };
+            let mirrors = seen.normal.dot(dir) > 0.0;
+            if !(if mirrors { calm.mirrored } else { calm.through }) {
+                continue;
+            }
+            let shown = if mirrors {
+                mirrored(point, crossing, &rough.lobe, dir)
+            } else {
+                let_through(point, crossing, &rough.lobe, dir)
+            };
+            let light = point.path.weight * shown * radiance * part;
+            if light.is_finite() && context.sky.is_worth_a_ray(light, context.cutoff_of(point.path.part * part)) {
+                let media = if mirrors { point.path.media } else { crossing.beyond };
+                let media = context.absorption.is_some().then_some(media);
+                // Normals and the face itself may not agree on the side.
+                let (class, side) = if mirrors {
+                    (RayClass::Reflected, seen.geometric)
+                } else {
+                    (RayClass::Refracted, -seen.geometric)
+                };
+                let (ray, left) = point.start(class, above(dir, side));
+                self.hotspots.push_unbent(ray, left, light, media);
+            }
+        }
+        calm
+    }
+}
+
+/// What facets of a lobe mirror of light from a direction: a share, 1/sr.
+fn mirrored<G: ShadingPoint>(point: &PathVertex<G>, crossing: &Crossing, lobe: &Lobe, dir: Vec3) -> Vec3 {
+    let ShadingFrame { normal, view, .. } = point.surface.seen();
+    from_both_sides(normal, dir, |dir| {
+        let Some((facet, density)) = lobe.facet_to(view, dir) else { return Vec3::ZERO };
+        point.bsdf.bounce_weights(view.dot(facet), crossing).mirrored(lobe.sent(view, dir)) * density
+    })
+}
+
+/// What they let through.
+fn let_through<G: ShadingPoint>(point: &PathVertex<G>, crossing: &Crossing, lobe: &Lobe, dir: Vec3) -> Vec3 {
+    let ShadingFrame { normal, view, .. } = point.surface.seen();
+    from_both_sides(normal, dir, |dir| {
+        let facet = if crossing.n_i == crossing.n_t {
+            // Thin: as a mirror does, on the other side.
+            lobe.facet_to(view, reflect(dir, normal))
+        } else {
+            lobe.facet_through(view, dir, (crossing.n_i, crossing.n_t))
+        };
+        let Some((facet, density)) = facet else { return Vec3::ZERO };
+        point.bsdf.bounce_weights(view.dot(facet), crossing).refracted * density
+    })
+}
+
+/// What facets turn to a direction, of which there are two kinds: what some would send to the wrong side of the surface is
+/// sent to the right one instead ([`above`]).
+fn from_both_sides(normal: Vec3, dir: Vec3, turned_to: impl Fn(Vec3) -> Vec3) -> Vec3 {
+    turned_to(dir) + turned_to(reflect(dir, normal))
+}
+
+impl Lobe {
+    /// The facet that mirrors a direction to the view, and how densely directions lie there, 1/sr.
+    fn facet_to(&self, view: Vec3, dir: Vec3) -> Option<(Vec3, f32)> {
+        let facet = (view + dir).try_normalize()?;
+        (view.dot(facet) > 0.0 && self.is_on_front(facet)).then(|| (facet, self.density(view, facet)))
+    }
+
+    /// The facet that bends the view to a direction on the other side, between media of these indices, and how densely directions
+    /// lie there, 1/sr.
+    fn facet_through(&self, view: Vec3, dir: Vec3, (n_i, n_t): (f32, f32)) -> Option<(Vec3, f32)> {
+        let facet = (view * n_i + dir * n_t).try_normalize()?;
+        let facet = if self.is_on_front(facet) { facet } else { -facet };
+        let (near, far) = (view.dot(facet), dir.dot(facet));
+        if near <= 0.0 || far >= 0.0 {
+            return None;
+        }
+        // Of facets, not of what they mirror.
+        let facets = self.density(view, facet) * 4.0 * near;
+        let across = n_i * near + n_t * far;
+        Some((facet, facets * n_t * n_t * -far / (across * across)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::optics::refract;
+    use std::f32::consts::PI;
+
+    /// What part of drawn facets sends the view to within 8° of a direction, and what part should by their density.
+    fn within(
+        lobe: &Lobe,
+        view: Vec3,
+        dir: Vec3,
+        send: impl Fn(Vec3) -> Option<Vec3>,
+        density: impl Fn(Vec3) -> f32,
+    ) -> [f32; 2] {
+        let (count, least) = (40_000_u16, libm::cosf(8.0_f32.to_radians()));
+        let at = |k: u16| [(f32::from(k) + 0.5) / f32::from(count), (f32::from(k) * 0.618_034).fract()];
+        let drawn = (0..count).filter_map(|k| send(lobe.facet(view, at(k)))).filter(|to| to.dot(dir) > least).count();
+        let (tangent, bitangent) = dir.any_orthonormal_pair();
+        let area = 2.0 * PI * (1.0 - least);
+        let of_density = (0..count).map(at).map(|[u, v]| {
+            let (cosine, (sin, cos)) = (1.0 - u * (1.0 - least), libm::sincosf(2.0 * PI * v));
+            density(dir * cosine + (tangent * cos + bitangent * sin) * (1.0 - cosine * cosine).sqrt())
+        });
+        [drawn as f32 / f32::from(count), of_density.sum::<f32>() / f32::from(count) * area]
+    }
+
+    #[test]
+    fn facets_send_rays_as_densely_as_they_are_said_to() {
+        let axes = [Vec3::new(0.6, 0.8, 0.0), Vec3::new(-0.8, 0.6, 0.0)];
+        for (alpha, tilt) in [([0.1, 0.1], 0.0_f32), ([0.3, 0.3], 0.7), ([0.4, 0.1], 0.5), ([0.8, 0.8], 1.2)] {
+            let lobe = Lobe::new(axes, Vec3::Z, alpha);
+            let view = Vec3::new(libm::sinf(tilt), 0.0, libm::cosf(tilt));
+            for off in [0.0, 0.3] {
+                let facet = Vec3::new(off * 0.5, off, 1.0).normalize();
+                let to = reflect(-view, facet);
+                let mirrors = |facet: Vec3| Some(reflect(-view, facet));
+                let [drawn, said] =
+                    within(&lobe, view, to, mirrors, |to| lobe.facet_to(view, to).map_or(0.0, |(_, d)| d));
+                assert!((drawn - said).abs() < 0.02 * said + 0.001, "{alpha:?} {tilt} {off}: {drawn} {said}");
+                for (n_i, n_t) in [(1.0, 1.5), (1.5, 1.0), (1.33, 1.6)] {
+                    let bend = |facet: Vec3| refract(-view, facet, f64::from(n_i), f64::from(n_t));
+                    let Some(to) = bend(facet) else { continue };
+                    let density = |to: Vec3| lobe.facet_through(view, to, (n_i, n_t)).map_or(0.0, |(_, d)| d);
+                    let [drawn, said] = within(&lobe, view, to, bend, density);
+                    assert!(
+                        (drawn - said).abs() < 0.02 * said + 0.001,
+                        "{alpha:?} {tilt} {off} {n_i} {n_t}: {drawn} {said}"
+                    );
+                }
+            }
+        }
+    }
+}

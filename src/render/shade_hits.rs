@@ -1,0 +1,507 @@
+//! What rays that were traced together have hit: sorted by instance and shaded side by side where that can be, one by one
+//! elsewhere.
+//!
+//! Where several rays of a wave belong to one sample, they go by rank: so what a sample gathers is added in the order of its
+//! rays, whichever others are beside them.
+
+use super::branch::PathVertex;
+use super::context::Context;
+use super::curve::ShadowRays;
+use super::draws::{Draws, Purpose};
+use super::observer::Observer;
+use super::primary_rays::PrimaryRays;
+use super::seam::{is_same_crossing, is_same_surface};
+use super::shade::{Bsdf, LocalLight};
+use super::shading_batch::{BatchPoint, HitsByInstance, MaterialConstants, POINTS, Passed, ShadingBatch};
+use super::sobol::mix;
+use super::surface::{HitPrim, Surface};
+use super::wave::{Path, RayClass, Wave};
+use super::whitted::Tracer;
+use crate::accel::{Accel, Hit, Ray};
+use crate::math::Vec3;
+use crate::math::simd::LANES;
+
+/// Fewer points than these leave most of a register empty, and are shaded one by one.
+const FEW: usize = 3;
+
+/// Rays that were traced together.
+#[derive(Clone, Copy)]
+pub(crate) enum TracedRays<'a> {
+    /// From eyes: the `i`th is that of sample `i`.
+    PrimaryRays(&'a PrimaryRays),
+    /// Others of one class.
+    Wave(RayClass, &'a Wave),
+}
+
+impl<'a> TracedRays<'a> {
+    pub(crate) fn rays(self) -> &'a [Ray] {
+        match self {
+            Self::PrimaryRays(eyes) => eyes.rays(),
+            Self::Wave(_, wave) => &wave.rays,
+        }
+    }
+
+    pub(crate) fn hits(self) -> &'a [Hit] {
+        match self {
+            Self::PrimaryRays(eyes) => &eyes.hits,
+            Self::Wave(_, wave) => &wave.hits,
+        }
+    }
+
+    /// What the `i`th ray carries behind what it has hit, if that is a hole.
+    fn path_through(self, i: usize) -> Path {
+        match self {
+            Self::PrimaryRays(eyes) => eyes.path(i),
+            Self::Wave(_, wave) => Path { crossed: wave.crossed(i), ..wave.paths[i] },
+        }
+    }
+
+    /// What the `i`th ray carries.
+    pub(crate) fn path(self, i: usize) -> Path {
+        match self {
+            Self::PrimaryRays(eyes) => eyes.path(i),
+            Self::Wave(_, wave) => wave.paths[i],
+        }
+    }
+
+    /// Whether a ray may see what it meets weakened.
+    pub(crate) fn has_weights(self) -> bool {
+        match self {
+            Self::PrimaryRays(eyes) => eyes.are_immersed(),
+            Self::Wave(..) => true,
+        }
+    }
+
+    /// Whether the `i`th ray has hit something where it has crossed another surface just before.
+    fn touches(self, i: usize) -> bool {
+        match self {
+            Self::PrimaryRays(_) => false,
+            Self::Wave(_, wave) => wave.touches(i),
+        }
+    }
+
+    fn class(self) -> RayClass {
+        match self {
+            Self::PrimaryRays(_) => RayClass::Primary,
+            Self::Wave(class, _) => class,
+        }
+    }
+}
+
+/// Buffers of one worker.
+#[derive(Default)]
+pub(super) struct ShadingBuffers {
+    /// Both are large: there is always one of each, but while it is at work.
+    sorted: Option<HitsByInstance>,
+    batch: Option<Box<ShadingBatch>>,
+    /// Rays that met nothing and see the surroundings.
+    missed: Vec<u32>,
+    ranks: Ranks,
+    /// Points of a strip with their numbers for wide lights, and how many places they draw.
+    draws: Vec<(usize, Draws, u32)>,
+}
+
+/// The rays of a wave by rank: how many of the same sample come before.
+#[derive(Default)]
+struct Ranks {
+    /// By sample, how many of its rays have been ranked; zeros in between.
+    ranked: Vec<u32>,
+    /// By ray, its rank.
+    of_ray: Vec<u32>,
+    /// The rays by their ranks, and in each by their places in the wave.
+    rays: Vec<u32>,
+    /// Where those of each rank end.
+    ends: Vec<usize>,
+}
+
+impl Ranks {
+    fn rank(&mut self, rays: &[Ray]) {
+        let Self { ranked, of_ray, rays: order, ends } = self;
+        let samples = rays.iter().map(|ray| ray.sample as usize + 1).max().unwrap_or(0);
+        ranked.resize(samples.max(ranked.len()), 0);
+        of_ray.clear();
+        ends.clear();
+        for ray in rays {
+            let rank = &mut ranked[ray.sample as usize];
+            of_ray.push(*rank);
+            if ends.len() <= *rank as usize {
+                ends.push(0);
+            }
+            ends[*rank as usize] += 1;
+            *rank += 1;
+        }
+        rays.iter().for_each(|ray| ranked[ray.sample as usize] = 0);
+        // From how many there are to where they begin; where they begin grows to where they end.
+        let mut start = 0;
+        for end in ends.iter_mut() {
+            (*end, start) = (start, start + *end);
+        }
+        order.clear();
+        order.resize(rays.len(), 0);
+        for (ray, &rank) in (0..).zip(&*of_ray) {
+            let at = &mut ends[rank as usize];
+            order[*at] = ray;
+            *at += 1;
+        }
+    }
+
+    /// The rays of each rank.
+    fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        starts.zip(&self.ends).map(|(start, &end)| &self.rays[start..end])
+    }
+}
+
+impl<A: Accel, P: Observer> Tracer<'_, A, P> {
+    /// Adds what eye rays see.
+    pub(super) fn shade_eyes(&mut self, eyes: &PrimaryRays) {
+        let at_a_time = self.context.points_at_a_time;
+        for (start, hits) in (0..).step_by(at_a_time).zip(eyes.hits.chunks(at_a_time)) {
+            self.shade_some_eyes(eyes, (start, hits));
+            self.relieve();
+            self.follow_eyes();
+        }
+    }
+
+    /// The same of hits that follow each other.
+    fn shade_some_eyes(&mut self, eyes: &PrimaryRays, (first, hits): (u32, &[Hit])) {
+        let context = self.context;
+        let mut sorted = self.sort();
+        for (start, eight) in (first..).step_by(LANES).zip(hits.chunks(LANES)) {
+            // Neighbours mostly hit the same.
+            let first = eight[0].prim;
+            let alike = eight.iter().all(|hit| hit.prim == first);
+            if !(alike && eight[0].is_some() && sorted.take(context, (start, eight.len()), first)) {
+                (start..).zip(eight).for_each(|(i, hit)| self.shade_eye(eyes, &mut sorted, i, hit));
+            }
+        }
+        self.see_surroundings(TracedRays::PrimaryRays(eyes));
+        self.shade_sorted(TracedRays::PrimaryRays(eyes), sorted);
+    }
+
+    fn shade_eye(&mut self, eyes: &PrimaryRays, sorted: &mut HitsByInstance, i: u32, hit: &Hit) {
+        if hit.is_some() {
+            if !sorted.take(self.context, (i, 1), hit.prim) {
+                self.shade_one(TracedRays::PrimaryRays(eyes), i as usize);
+            }
+        } else if self.context.shows_environment {
+            self.beside.missed.push(i);
+        } else {
+            self.samples[i as usize].through += Vec3::ONE;
+        }
+    }
+
+    /// Adds what the rays of a wave see.
+    pub(super) fn shade_wave(&mut self, class: RayClass, wave: &Wave) {
+        let mut ranks = std::mem::take(&mut self.beside.ranks);
+        ranks.rank(&wave.rays);
+        for rays in ranks.iter().flat_map(|rays| rays.chunks(self.context.points_at_a_time)) {
+            self.shade_some((class, wave), rays);
+            self.relieve();
+        }
+        self.beside.ranks = ranks;
+    }
+
+    /// The same of these of its rays, which belong to different samples.
+    fn shade_some(&mut self, (class, wave): (RayClass, &Wave), rays: &[u32]) {
+        let context = self.context;
+        let traced = TracedRays::Wave(class, wave);
+        let mut sorted = self.sort();
+        for &index in rays {
+            let i = index as usize;
+            let (ray, path, hit) = (&wave.rays[i], &wave.paths[i], &wave.hits[i]);
+            if !hit.is_some() {
+                if path.straight || path.skips_hotspot { self.leave(ray, path) } else { self.beside.missed.push(index) }
+            } else if self.is_crossed(wave, i) {
+                self.continuing[class as usize].push_behind(*ray, *path, *hit);
+            } else if rays.len() < FEW
+                || self.sees_glare_again(path, hit)
+                || !sorted.take(context, (index, 1), hit.prim)
+            {
+                self.shade_one(traced, i);
+            }
+        }
+        self.see_surroundings(traced);
+        self.shade_sorted(traced, sorted);
+    }
+
+    /// Whether the `i`th ray has crossed already what it has hit.
+    fn is_crossed(&self, wave: &Wave, i: usize) -> bool {
+        let (ray, hit) = (&wave.rays[i], &wave.hits[i]);
+        let face = |prim| self.context.face(prim);
+        match wave.starts {
+            true => wave.touches(i) && is_same_surface(face, ray, &wave.after[i], hit),
+            false => is_same_crossing(face, ray, &wave.paths[i].crossed, hit),
+        }
+    }
+
+    /// Whether what lies behind a hit is seen by a path with hotspot that was seen without.
+    fn sees_glare_again(&self, path: &Path, hit: &Hit) -> bool {
+        path.skips_hotspot && self.context.turns(&self.context.scene.materials[self.context.face(hit.prim).1 as usize])
+    }
+
+    /// Shades what the `i`th ray has hit.
+    fn shade_one(&mut self, traced: TracedRays, i: usize) {
+        let (ray, hit) = (&traced.rays()[i], &traced.hits()[i]);
+        self.shade(traced.class(), (ray, hit, traced.touches(i)), &traced.path_through(i));
+    }
+
+    fn sort(&mut self) -> HitsByInstance {
+        let mut sorted = self.beside.sorted.take().unwrap_or_default();
+        sorted.clear(self.context.scene.instances.len());
+        sorted
+    }
+
+    /// Adds what rays that met nothing see.
+    fn see_surroundings(&mut self, traced: TracedRays) {
+        let mut missed = std::mem::take(&mut self.beside.missed);
+        match traced {
+            TracedRays::PrimaryRays(eyes) => {
+                let samples = &mut self.samples;
+                let tell = |i: u32, radiance: Vec3| samples[i as usize].radiance += radiance;
+                self.context.sky.each_behind(&missed, eyes.columns(), tell);
+            }
+            TracedRays::Wave(_, wave) => {
+                let rays = missed.iter().map(|&i| (i, wave.rays[i as usize].dir, wave.paths[i as usize].cone_spread));
+                self.context.sky.each_radiance(rays, |i, radiance| {
+                    let (ray, path) = (&wave.rays[i as usize], &wave.paths[i as usize]);
+                    self.samples[ray.sample as usize].radiance += path.weight * radiance;
+                });
+            }
+        }
+        missed.clear();
+        self.beside.missed = missed;
+    }
+
+    /// Shades the points that were taken, and gives the buffers back.
+    fn shade_sorted(&mut self, traced: TracedRays, sorted: HitsByInstance) {
+        let mut batch = self.beside.batch.take().unwrap_or_default();
+        for k in 0..sorted.instances() {
+            let (instance, hits) = sorted.of(k);
+            for hits in hits.chunks(POINTS) {
+                if hits.len() < FEW {
+                    hits.iter().for_each(|&(ray, _)| self.shade_one(traced, ray as usize));
+                } else {
+                    self.shade_batch(traced, &sorted, (instance, hits), &mut batch);
+                }
+            }
+        }
+        self.beside.batch = Some(batch);
+        self.beside.sorted = Some(sorted);
+    }
+
+    /// Shades points of one instance side by side, as [`Self::shade`] does one by one.
+    fn shade_batch(
+        &mut self,
+        traced: TracedRays,
+        sorted: &HitsByInstance,
+        (instance, hits): (u32, &[(u32, u32)]),
+        batch: &mut ShadingBatch,
+    ) {
+        let context = self.context;
+        let mesh = &context.scene.meshes[context.scene.instances[instance as usize].mesh as usize];
+        let Some(common) = &context.common[mesh.material as usize] else { return };
+        let (smooth, reads) = (!mesh.normals.is_empty(), common.mapped || !mesh.colors.is_empty());
+        let (bsdf, shiny, placement) = (&common.bsdf, common.shiny, context.world.placement(instance));
+        batch.take(hits, sorted, (traced, &context.absorption), smooth);
+        batch.find(smooth.then_some(placement));
+        if reads || shiny || context.looks_around_by_points() {
+            batch.widen(traced);
+        }
+        if reads {
+            batch.read(context, traced, (mesh, placement), common);
+        }
+        if !common.is_completed() {
+            batch.blur(traced, bsdf);
+        }
+        if shiny {
+            batch.bend(context, common, smooth.then_some(placement));
+        }
+        if common.spreads {
+            batch.retain(|ray| traced.path(ray).depth < context.depth);
+        }
+        for index in batch.left_out() {
+            self.shade_one(traced, index as usize);
+        }
+        batch.thin_out((common, reads), |at, passed| self.pass(traced, at, passed));
+        if batch.is_empty() {
+            return;
+        }
+        self.note_batch(traced, (instance, bsdf), batch);
+        batch.complete(context, traced, (mesh, placement), common);
+        batch.overlay(context, traced, (mesh, placement), common);
+        if !common.glass.is_some_and(|glass| glass.is_dark_inside && batch.sees_backs_alone()) {
+            self.show(traced, common, batch);
+        }
+        if common.sends_by_points() {
+            self.each_point(traced, common, batch, |tracer, point| {
+                if point.path.depth < context.depth {
+                    tracer.reflect_and_refract(point, &point.crossing(context, point.path.band));
+                }
+            });
+        } else if shiny && context.depth > 0 {
+            let (roulette, streams) = (self.roulette, &self.streams);
+            let goes_on = |sample, path: &mut _| roulette.spin(streams, sample, path);
+            batch.mirror(context, bsdf, traced, (goes_on, &mut self.starting[RayClass::Reflected as usize]));
+        }
+    }
+
+    /// Sends the ray at this place of what was traced on behind what it has hit.
+    fn pass(&mut self, traced: TracedRays, at: usize, passed: Passed) {
+        let (context, class) = (self.context, traced.class());
+        let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
+        let lessened = |path| match context.absorption.is_some() {
+            true => context.absorption.lessened(ray, &path, hit),
+            false => path,
+        };
+        match passed {
+            Passed::Back => self.continuing[class as usize].push_behind(*ray, lessened(path).behind_back(), *hit),
+            Passed::Covered(covered) if covered <= 0.0 => {
+                self.continuing[class as usize].push(*ray, traced.path_through(at), *hit);
+            }
+            Passed::Covered(covered) => self.go_on(ray, &lessened(path), hit, covered),
+        }
+    }
+
+    /// Remembers the points of an instance, whose material is `even` but for maps, that are the first surfaces of their samples.
+    fn note_batch(&mut self, traced: TracedRays, (instance, even): (u32, &Bsdf), batch: &ShadingBatch) {
+        if self.firsts.is_empty() {
+            return;
+        }
+        for (at, sample, found) in batch.firsts(instance, even, self.context.world.center) {
+            let first = &mut self.firsts[sample as usize];
+            if !first.is_some() && traced.path(at).straight {
+                *first = found;
+            }
+        }
+    }
+
+    /// Adds what the points show of their surroundings and of each light, or sends the rays that find whether it arrives.
+    fn show(&mut self, traced: TracedRays, common: &MaterialConstants, batch: &mut ShadingBatch) {
+        let (context, bsdf) = (self.context, &common.bsdf);
+        let has_inside = common.has_inside();
+        if context.looks_around_by_points() || common.is_completed() {
+            self.each_point(traced, common, batch, |tracer, point| tracer.look_around(point));
+        } else if !context.is_dark || bsdf.shines() {
+            batch.look_around((bsdf, has_inside), &context.sky, context.scene.ambient);
+            batch.shown().for_each(|(sample, everywhere)| self.add(sample, everywhere));
+        }
+        let absorbs = context.absorption.is_some();
+        let within = absorbs && batch.certain().any(|i| traced.path(batch.arrival(i).0).media.innermost().is_some());
+        let what = (bsdf, common.shiny, has_inside);
+        let mut draws = std::mem::take(&mut self.beside.draws);
+        draws.clear();
+        for (number, light) in (0..).zip(&context.lights) {
+            if !light.is_area() {
+                batch.shine(what, light, None);
+                self.choose(traced, (light, number), batch);
+                self.ask_for(traced, light, batch, (within, None));
+                continue;
+            }
+            if draws.is_empty() {
+                draws.extend(batch.certain().map(|i| self.draws_for_lights(traced, batch, i)));
+            }
+            for place in 0..batch.draw(draws.iter_mut().map(|(i, draws, rays)| (*i, draws.spread(*rays), *rays))) {
+                batch.shine(what, light, Some(place));
+                self.choose(traced, (light, mix(number, place + 1)), batch);
+                self.ask_for(traced, light, batch, (within, Some(place)));
+            }
+        }
+        self.beside.draws = draws;
+    }
+
+    /// Leaves out points to which a light brings little, by chance.
+    fn choose(&self, traced: TracedRays, (light, number): (&LocalLight, u32), batch: &mut ShadingBatch) {
+        if !(light.shadows && self.chooses_shadow_rays()) {
+            return;
+        }
+        batch.choose(|at, sample, radiance| {
+            let path = traced.path(at);
+            self.roulette.sends(&self.streams, (sample, path.branch, path.part), number, radiance)
+        });
+    }
+
+    /// Point `i` with its numbers for wide lights, and how many places it draws of each.
+    fn draws_for_lights(&self, traced: TracedRays, batch: &ShadingBatch, i: usize) -> (usize, Draws, u32) {
+        let (context, (at, ..)) = (self.context, batch.arrival(i));
+        let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
+        let draws = Draws::at(context.seed, &self.streams, path.branch, ray, hit, Purpose::Lights);
+        (i, draws, context.light_rays_at(path.depth))
+    }
+
+    /// Adds what points show of a light, of the `place`th that they have drawn of it, or sends rays that find whether it
+    /// arrives, `within` what is around the points.
+    fn ask_for(
+        &mut self,
+        traced: TracedRays,
+        light: &LocalLight,
+        batch: &ShadingBatch,
+        (within, place): (bool, Option<u32>),
+    ) {
+        let context = self.context;
+        let absorbs = context.absorption.is_some();
+        if !light.shadows {
+            return batch.shone().for_each(|(sample, radiance)| self.add(sample, radiance));
+        }
+        if within {
+            batch.send_within(&mut self.shadows, traced);
+        } else {
+            batch.send(&mut self.shadows, absorbs);
+        }
+        for (i, radiance) in batch.grazed() {
+            let at = batch.arrival(i).0;
+            let (ray, hit) = (&traced.rays()[at], &traced.hits()[at]);
+            let drawn = place.map(|place| batch.drawn(i, place));
+            if let Some(shadow_rays) = shadow_rays(context, (light, drawn), ray, hit) {
+                let media = absorbs.then(|| traced.path(at).media);
+                self.shadows.push_feelers(&shadow_rays, radiance, media);
+            }
+        }
+    }
+
+    /// Does what must be done point by point.
+    fn each_point(
+        &mut self,
+        traced: TracedRays,
+        common: &MaterialConstants,
+        batch: &ShadingBatch,
+        mut act: impl FnMut(&mut Self, &PathVertex<BatchPoint>),
+    ) {
+        let context = self.context;
+        let material = (common.material, &context.scene.materials[common.material as usize]);
+        let has_inside = common.has_inside();
+        for i in batch.certain() {
+            let (at, weight, width) = batch.arrival(i);
+            let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
+            let since = if context.absorption.is_some() { hit.t } else { path.since };
+            let ground = batch.ground(i, material, has_inside);
+            let bare;
+            let bsdf = match batch.whole(i) {
+                Some(whole) => whole,
+                None => {
+                    bare = ground.covered(&common.bsdf);
+                    &bare
+                }
+            };
+            let path = Path { weight, since, ..path };
+            let touches = traced.touches(at);
+            act(self, &PathVertex { ray, hit, path, width, surface: &ground, bsdf, touches });
+        }
+    }
+}
+
+/// What finds out whether a light shines on the round surface at `hit`, one place of it if that was drawn.
+fn shadow_rays(
+    context: &Context,
+    (light, drawn): (&LocalLight, Option<[f32; 2]>),
+    ray: &Ray,
+    hit: &Hit,
+) -> Option<ShadowRays> {
+    let target = HitPrim::new(context.scene, context.world, hit.prim);
+    let surface = Surface::new(context.world, target, ray, hit, 0.0);
+    let incident = match drawn {
+        Some(drawn) => light.incident_from(surface.position, drawn)?,
+        None => light.incident(surface.position)?,
+    };
+    surface.shadow_rays(&incident, ray.sample)
+}

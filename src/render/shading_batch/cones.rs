@@ -1,0 +1,274 @@
+//! What a ray's cone covers at each point of a strip, and how far the surface bends in it: how wide narrow highlights must
+//! be, and what the surface mirrors.
+
+use super::columns::{Column, Columns, Found, Given, POINTS, ShadingBatch, get, leave, padded, put};
+use super::constants::MaterialConstants;
+use super::painted::Painted;
+use crate::accel::{Hit, NO_PRIM, Ray};
+use crate::math::Vec3;
+use crate::math::simd::{Kernel, Simd};
+use crate::render::context::Context;
+use crate::render::glint;
+use crate::render::patch::Footprint;
+use crate::render::shade::{Bsdf, Model};
+use crate::render::shade_hits::TracedRays;
+use crate::render::wave::{Path, Queue, RayClass};
+use crate::render::world::Placement;
+
+/// The cones.
+pub(crate) struct Cones {
+    /// Width at the point, and growth.
+    pub(super) width: Column,
+    pub(super) spread: Column,
+    /// Axes of the ellipse in which the cone meets the surface.
+    along: Columns,
+    across: Columns,
+    /// Squares of the angles by which the mesh's own normal turns along both axes, summed, …
+    pub(super) bend: Column,
+    /// … and of those by which a normal map turns it in reach.
+    pub(super) turning: Column,
+    /// α² of the highlights of lights at least.
+    pub(super) least_square: Column,
+    mirrored: Mirrored,
+}
+
+/// The rays that find what is mirrored.
+struct Mirrored {
+    /// 1 where it can be seen.
+    alive: [u32; POINTS],
+    weight: Columns,
+    origin: Columns,
+    dir: Columns,
+    spread: Column,
+}
+
+/// The weights of eye rays.
+pub(super) const ONES: Columns = [[1.0; POINTS]; 3];
+
+impl Default for Cones {
+    fn default() -> Self {
+        let (one, three) = ([0.0; POINTS], [[0.0; POINTS]; 3]);
+        let mirrored = Mirrored { alive: [0; POINTS], weight: three, origin: three, dir: three, spread: one };
+        Self {
+            width: one,
+            spread: one,
+            along: three,
+            across: three,
+            bend: one,
+            turning: one,
+            least_square: one,
+            mirrored,
+        }
+    }
+}
+
+impl Cones {
+    /// What a cone covers at point `i`.
+    #[inline(always)]
+    pub(super) fn footprint(&self, i: usize) -> Footprint {
+        Footprint { along: get(&self.along, i), across: get(&self.across, i) }
+    }
+}
+
+impl ShadingBatch {
+    /// Finds what the cones of the rays cover.
+    pub(crate) fn widen(&mut self, traced: TracedRays) {
+        let count = self.count.min(POINTS);
+        let Self { cones, found, rays, .. } = self;
+        cones.turning.fill(0.0);
+        for (i, &ray) in rays[..count].iter().enumerate() {
+            let (Path { cone_width, cone_spread, .. }, hit) = (traced.path(ray as usize), &traced.hits()[ray as usize]);
+            (cones.width[i], cones.spread[i]) = (cone_width + cone_spread * hit.t, cone_spread);
+        }
+        self.level.run(Print { found, cones, points: padded(count) });
+    }
+
+    /// Finds how far a surface bends where cones meet it, and how wide highlights must be, unless that is found when points are
+    /// completed; `placement` where the mesh has normals of its own.
+    pub(crate) fn bend(&mut self, context: &Context, common: &MaterialConstants, placement: Option<&Placement>) {
+        let bsdf = &common.bsdf;
+        let Self { cones, painted, given, found, .. } = self;
+        let (points, reach) = (padded(self.count), context.highlight_reach);
+        match placement {
+            Some(placement) => self.level.run(Bend { given, found, cones, points, placement }),
+            None => cones.bend.fill(0.0),
+        }
+        if !context.lights.is_empty() && !common.is_completed() {
+            self.level.run(WidenHighlights { painted, cones, points, bsdf, reach });
+        }
+    }
+
+    /// Sends the rays that find what a surface of `bsdf` mirrors.
+    pub(crate) fn mirror(
+        &mut self,
+        context: &Context,
+        bsdf: &Bsdf,
+        traced: TracedRays,
+        (goes_on, to): (impl Fn(u32, &mut Path) -> bool, &mut Queue),
+    ) {
+        let Self { cones, painted, found, given, weights, .. } = self;
+        let (points, cutoff) = (padded(self.count), context.least_cutoff());
+        let weights = weights.as_ref().unwrap_or(&ONES);
+        self.level.run(Mirror { painted, found, cones, points, bsdf, weights, cutoff });
+        let Mirrored { alive, weight, origin, dir, spread } = &cones.mirrored;
+        let prims = given.faces.prims();
+        for i in (0..self.count.min(POINTS)).filter(|&i| alive[i] == 1) {
+            let path = traced.path(self.rays[i] as usize);
+            if path.depth >= context.depth || !context.is_alive(get(weight, i), path.part) {
+                continue;
+            }
+            let (exclude, sample) = (prims[i], self.samples[i]);
+            let (origin, dir) = (get(origin, i), get(dir, i));
+            let ray = Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude, sample };
+            debug_assert_ne!(exclude, NO_PRIM);
+            let (cone_width, cone_spread, weight) = (cones.width[i], spread[i], get(weight, i));
+            let depth = path.depth + 1;
+            let path = Path {
+                weight,
+                depth,
+                straight: false,
+                skips_hotspot: false,
+                since: 0.0,
+                cone_width,
+                cone_spread,
+                ..path
+            };
+            let mut path = path.turned(RayClass::Reflected, 0);
+            if goes_on(sample, &mut path) {
+                to.push(ray, path, Hit::MISS);
+            }
+        }
+    }
+}
+
+struct Print<'a> {
+    found: &'a Found,
+    cones: &'a mut Cones,
+    points: usize,
+}
+
+impl Kernel for Print<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { found, cones, points } = self;
+        for i in 0..points.min(POINTS) {
+            let (view, geometric) = (get(&found.view, i), get(&found.geometric, i));
+            let Footprint { along, across } = Footprint::new(-view, geometric, cones.width[i]);
+            put(&mut cones.along, i, along);
+            put(&mut cones.across, i, across);
+        }
+    }
+}
+
+struct Bend<'a> {
+    given: &'a Given,
+    found: &'a Found,
+    cones: &'a mut Cones,
+    points: usize,
+    placement: &'a Placement,
+}
+
+impl Kernel for Bend<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { given, found, cones, points, placement } = self;
+        let placement = *placement;
+        for i in 0..points.min(POINTS) {
+            let (faces, weights) = (&given.faces, given.corner_weights(i));
+            let Footprint { along, across } = cones.footprint(i);
+            let [along, across] = faces.gradients(i).of_normal(&placement, faces.normals(i), weights, [along, across]);
+            let bend = along.length_squared() + across.length_squared();
+            cones.bend[i] = if found.curved[i] == 1 { bend } else { 0.0 };
+        }
+    }
+}
+
+struct WidenHighlights<'a> {
+    painted: &'a Painted,
+    cones: &'a mut Cones,
+    points: usize,
+    bsdf: &'a Bsdf,
+    reach: f32,
+}
+
+impl Kernel for WidenHighlights<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { painted, cones, points, bsdf, reach } = self;
+        let Model::MetalRough(m) = &bsdf.model else { return };
+        let (any, even) = (painted.any, *m);
+        for i in 0..points.min(POINTS) {
+            let m = if any { painted.metal_rough(i, &even) } else { even };
+            let turning = cones.bend[i] * (reach * reach) + cones.turning[i];
+            cones.least_square[i] = m.least_square_where_narrow(glint::least_of(turning, cones.spread[i], reach));
+        }
+    }
+}
+
+struct Mirror<'a> {
+    painted: &'a Painted,
+    found: &'a Found,
+    cones: &'a mut Cones,
+    points: usize,
+    bsdf: &'a Bsdf,
+    weights: &'a Columns,
+    cutoff: f32,
+}
+
+impl Kernel for Mirror<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { painted, found, cones, points, bsdf, weights, cutoff } = self;
+        let (any, rays) = (painted.any, (weights, cutoff));
+        match &bsdf.model {
+            Model::Unlit(_) => cones.mirrored.alive.fill(0),
+            Model::Phong(m) if any => {
+                let m = *m;
+                mirror(found, cones, points, rays, |i, cosine| painted.phong(i, &m).reflected(cosine));
+            }
+            Model::Phong(m) => {
+                let m = *m;
+                mirror(found, cones, points, rays, |_, cosine| m.reflected(cosine));
+            }
+            Model::MetalRough(m) if any => {
+                let m = *m;
+                mirror(found, cones, points, rays, |i, cosine| painted.metal_rough(i, &m).reflected(cosine));
+            }
+            Model::MetalRough(m) => {
+                let m = *m;
+                mirror(found, cones, points, rays, |_, cosine| m.reflected(cosine));
+            }
+        }
+    }
+}
+
+/// The rays of points that mirror such shares of light where the cosine of the view is so; they follow rays of these
+/// weights, and may be sent above the cutoff.
+#[inline(always)]
+fn mirror(
+    found: &Found,
+    cones: &mut Cones,
+    points: usize,
+    (weights, cutoff): (&Columns, f32),
+    share: impl Fn(usize, f32) -> Vec3,
+) {
+    let Cones { mirrored: to, bend, spread, .. } = cones;
+    for i in 0..points.min(POINTS) {
+        let seen = found.seen(i);
+        let weight = get(weights, i) * share(i, seen.normal.dot(seen.view));
+        let dir = seen.mirrored();
+        put(&mut to.weight, i, weight);
+        put(&mut to.dir, i, dir);
+        put(&mut to.origin, i, leave(found, i, dir));
+        to.spread[i] = glint::behind(bend[i], spread[i], glint::MIRROR);
+        to.alive[i] = u32::from((weight.max_element() >= cutoff) & (found.certain[i] == 1));
+    }
+}

@@ -1,0 +1,153 @@
+//! What all points of a material have in common.
+
+use super::material_maps::MaterialMaps;
+use crate::render::context::Gloss;
+use crate::render::shade::{Bsdf, Model, has_inside};
+use crate::render::texture::TextureStore;
+use crate::scene::{Material, MetalRough};
+
+/// What is known of a material for all points of it.
+pub(crate) struct MaterialConstants {
+    /// Its number.
+    pub material: u32,
+    /// As it is where its maps are white.
+    pub bsdf: Bsdf,
+    /// Whether backs of faces are passed.
+    pub one_sided: bool,
+    /// How much is seen of it where neither maps nor vertices say.
+    pub covered: f32,
+    /// Whether maps change it from point to point.
+    pub mapped: bool,
+    /// Those maps and the colours of vertices, where they can be read side by side.
+    pub material_maps: Option<MaterialMaps>,
+    /// Whether cones and how they bend must be known: it may mirror, where rays bounce, or show lights as narrow highlights, or
+    /// has lobes that may.
+    pub shiny: bool,
+    /// Where light enters it, which rays follow.
+    pub glass: Option<Glass>,
+    /// What each point has over it, or reads for itself.
+    pub lobes: Option<Lobes>,
+    /// Whether all that it mirrors and lets through is seen by rays, where any may go on.
+    pub spreads: bool,
+}
+
+/// What is known of a material whose points have more lobes than that of their facets, or maps of their reflectance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lobes {
+    /// Whether the mesh around a point must be known, …
+    pub reads_mesh: bool,
+    /// … or must if its sheet does not say what maps of lobes do.
+    pub reads_maps: bool,
+    /// Whether maps say how much it reflects.
+    pub reads_reflectance: bool,
+    /// Whether they are sheen and clear coat alone, which leave what is under them as it is.
+    pub are_overlays: bool,
+}
+
+/// What is known of a material that lets light in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Glass {
+    /// Whether backs of faces are seen from inside.
+    pub has_inside: bool,
+    /// Whether nothing of its surface is seen from inside but what rays find that go on.
+    pub is_dark_inside: bool,
+}
+
+impl MaterialConstants {
+    /// `None` for what lets light in, unless it is metallic-rough and rays go through it without being scattered on their way.
+    pub(crate) fn of(
+        (number, material): (u32, &Material),
+        store: &TextureStore,
+        bounces: bool,
+        gloss: Gloss,
+    ) -> Option<Self> {
+        let metal_rough = material.metal_rough();
+        let mut bsdf = Bsdf::without_maps(material, store);
+        let glass = material.reflection.transmits();
+        let lobes = metal_rough.and_then(Lobes::of);
+        let spreads = bounces && gloss.spreads(material);
+        if glass {
+            metal_rough.filter(|m| spreads && !scatters_inside(m) && m.diffuse_transmission.is_none())?;
+        }
+        if spreads {
+            bsdf.spread_by_rays();
+        }
+        let mirrors = match &bsdf.model {
+            Model::Unlit(_) => false,
+            Model::Phong(m) => m.mirrors(),
+            Model::MetalRough(m) => m.mirrors(),
+        };
+        // A map can make it smoother.
+        let smooth = metal_rough.is_some_and(|m| m.metal_rough_map.is_some());
+        Some(Self {
+            material: number,
+            shiny: glass || lobes.is_some() || smooth || bsdf.has_narrow_highlight() || bounces && mirrors,
+            one_sided: !material.double_sided && !glass,
+            covered: material.alpha_mode.covers(material.opacity),
+            mapped: material.textures().next().is_some(),
+            material_maps: MaterialMaps::of(material, store),
+            glass: glass.then(|| Glass::of(material, &bsdf)),
+            lobes,
+            spreads: spreads && metal_rough.is_some(),
+            bsdf,
+        })
+    }
+
+    /// Whether rays that go on from it are found point by point.
+    pub(crate) fn sends_by_points(&self) -> bool {
+        self.glass.is_some() || self.lobes.is_some() || self.spreads
+    }
+
+    /// Whether what its points are made of is found point by point.
+    pub(crate) fn is_completed(&self) -> bool {
+        self.lobes.is_some_and(|lobes| !lobes.are_overlays)
+    }
+
+    /// Whether backs of faces are seen from inside.
+    pub(crate) fn has_inside(&self) -> bool {
+        self.glass.is_some_and(|glass| glass.has_inside)
+    }
+}
+
+impl Lobes {
+    /// `None` for materials without any.
+    fn of(m: &MetalRough) -> Option<Self> {
+        let reads_maps = other_maps(m) > 0;
+        let reads_mesh = m.anisotropy.is_some() || m.coat.as_ref().is_some_and(|coat| coat.normal_map.is_some());
+        let reads_reflectance = reads_reflectance(m);
+        let changes_core =
+            m.anisotropy.is_some() || m.iridescence.is_some() || m.diffuse_transmission.is_some() || reads_reflectance;
+        (m.has_lobes() || m.diffuse_transmission.is_some() || reads_maps).then_some(Self {
+            reads_mesh,
+            reads_maps,
+            reads_reflectance,
+            are_overlays: !changes_core && m.transmission <= 0.0,
+        })
+    }
+}
+
+impl Glass {
+    fn of(material: &Material, bsdf: &Bsdf) -> Self {
+        let has_inside = has_inside(material);
+        let changes = |m: &MetalRough| m.transmission_map.is_some() || m.metal_rough_map.is_some();
+        let changes = material.metal_rough().is_some_and(changes);
+        Self { has_inside, is_dark_inside: has_inside && !changes && bsdf.is_dark_inside() }
+    }
+}
+
+/// Whether light that was let in may be scattered from inside: what is left for that is found for each point.
+fn scatters_inside(m: &MetalRough) -> bool {
+    m.thick && (m.transmission < 1.0 || m.transmission_map.is_some())
+}
+
+/// Whether maps say how much it reflects.
+pub(super) fn reads_reflectance(m: &MetalRough) -> bool {
+    m.specular_map.is_some() || m.specular_color_map.is_some()
+}
+
+/// How many maps it has of more than its colour, roughness and metalness, and of what passes through: of its reflectance, and of
+/// lobes. How thick it is matters only where that is looked up.
+pub(super) fn other_maps(m: &MetalRough) -> usize {
+    let known = [&m.metal_rough_map, &m.transmission_map, &m.thickness_map];
+    m.maps().count() - known.into_iter().flatten().count()
+}

@@ -1,0 +1,105 @@
+//! Points of a strip one by one, for what no column knows: rays that go on through glass and off several lobes, rays to the
+//! surroundings, and what layers of a picture tell.
+
+use super::columns::{ShadingBatch, get, leave};
+use crate::accel::{NO_PRIM, Ray};
+use crate::math::{DVec3, Vec3};
+use crate::render::branch::ShadingPoint;
+use crate::render::context::Context;
+use crate::render::layers::FirstSurface;
+use crate::render::shade::{Bsdf, ShadingFrame};
+use crate::scene::Material;
+
+/// One of the points, as rays that go on ask for it.
+pub(crate) struct BatchPoint<'a> {
+    batch: &'a ShadingBatch,
+    i: usize,
+    material: (u32, &'a Material),
+    /// Whether it is seen from outside.
+    outside: bool,
+}
+
+impl ShadingBatch {
+    /// The points that are shaded here.
+    pub(crate) fn certain(&self) -> impl Iterator<Item = usize> {
+        (0..self.count).filter(|&i| self.found.certain[i] == 1)
+    }
+
+    /// The place in what was traced of the ray that came to point `i`, its weight there, and the width of its cone.
+    pub(crate) fn arrival(&self, i: usize) -> (usize, Vec3, f32) {
+        let weight = self.weights.as_ref().map_or(Vec3::ONE, |weights| get(weights, i));
+        (self.rays[i] as usize, weight, self.cones.width[i])
+    }
+
+    /// Of each point that is shaded here: the place in what was traced of its ray, its sample, and what layers of a
+    /// picture tell of it, whose material is `even` but for maps.
+    pub(crate) fn firsts(
+        &self,
+        instance: u32,
+        even: &Bsdf,
+        center: DVec3,
+    ) -> impl Iterator<Item = (usize, u32, FirstSurface)> {
+        let prims = self.given.faces.prims();
+        self.certain().map(move |i| {
+            let at = (get(&self.found.position, i), get(&self.found.normal, i));
+            let albedo = self.bare(i, even, true).model.base();
+            (self.rays[i] as usize, self.samples[i], FirstSurface::new((prims[i], instance), at, albedo, center))
+        })
+    }
+
+    /// The material at point `i`, which is `even` where maps do not change it, but for its lobes.
+    pub(super) fn bare(&self, i: usize, even: &Bsdf, outside: bool) -> Bsdf {
+        if self.painted.any {
+            return Bsdf::bare(self.painted.model(i, &even.model), self.painted.emission(i), outside);
+        }
+        Bsdf::bare(even.model, even.emission, outside)
+    }
+
+    /// The ground at point `i` of this material, by number too, the back of which is seen from inside if it `has_inside`.
+    pub(crate) fn ground<'a>(&'a self, i: usize, material: (u32, &'a Material), has_inside: bool) -> BatchPoint<'a> {
+        BatchPoint { batch: self, i, material, outside: self.found.front[i] == 1 || !has_inside }
+    }
+}
+
+impl BatchPoint<'_> {
+    /// The material there, which is `even` where maps do not change it, under what lies over it.
+    pub(crate) fn covered(&self, even: &Bsdf) -> Bsdf {
+        let bare = self.batch.bare(self.i, even, self.outside);
+        match self.batch.overlays.as_ref().filter(|over| over.any()) {
+            Some(over) => bare.under(over.at(self.i)),
+            None => bare,
+        }
+    }
+}
+
+impl ShadingPoint for BatchPoint<'_> {
+    fn material(&self) -> (u32, &Material) {
+        self.material
+    }
+
+    fn seen(&self) -> ShadingFrame {
+        ShadingFrame { outside: self.outside, ..self.batch.found.seen(self.i) }
+    }
+
+    fn is_front(&self) -> bool {
+        self.batch.found.front[self.i] == 1
+    }
+
+    fn bend(&self, _: &Context) -> f32 {
+        self.batch.cones.bend[self.i]
+    }
+
+    fn ray(&self, dir: Vec3, sample: u32) -> Ray {
+        let (exclude, origin) = (self.batch.given.faces.prims()[self.i], leave(&self.batch.found, self.i, dir));
+        debug_assert_ne!(exclude, NO_PRIM);
+        Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude, sample }
+    }
+
+    fn set_off(&self, dir: Vec3) -> [Vec3; 2] {
+        [leave(&self.batch.found, self.i, dir), get(&self.batch.found.position, self.i)]
+    }
+
+    fn excluded(&self) -> u32 {
+        self.batch.given.faces.prims()[self.i]
+    }
+}

@@ -1,0 +1,428 @@
+//! The light that arrives at the points of a strip, and the shadow rays that ask whether it does.
+
+use super::area_lights::Drawn;
+use super::columns::{Column, Columns, Found, LANES, POINTS, ShadingBatch, get, leave, padded, put};
+use super::cones::Cones;
+use super::environment::Weigh;
+use super::overlays::Overlays;
+use super::painted::Painted;
+use crate::accel::Ray;
+use crate::math::Vec3;
+use crate::math::simd::{Kernel, Simd};
+use crate::render::curve::STEEP;
+use crate::render::shade::{Bsdf, Incident, LocalLight, Model, PhongBsdf, terminator, way};
+use crate::render::shade_hits::TracedRays;
+use crate::render::shadow::{Bound, ShadowQueue};
+use crate::render::wave::Media;
+
+/// Light whose shadow ray starts on the triangle.
+const PLAIN: u32 = 1;
+
+/// Light so flat that the shadow ray must be found by [`Surface`](crate::render::surface::Surface).
+const GRAZING: u32 = 2;
+
+/// What one light does at each point.
+#[repr(C, align(64))]
+pub(super) struct Lit {
+    /// [`PLAIN`] or [`GRAZING`] where it is seen, else 0.
+    pub seen: [u32; POINTS],
+    pub to_light: Columns,
+    /// Its strength, or irradiance, as the model wants it.
+    pub light: Columns,
+    pub radiance: Columns,
+    /// The shadow ray.
+    pub origin: Columns,
+    pub dir: Columns,
+    pub end: Column,
+}
+
+impl Default for Lit {
+    fn default() -> Self {
+        let empty = [[0.0; POINTS]; 3];
+        Self {
+            seen: [0; POINTS],
+            to_light: empty,
+            light: empty,
+            radiance: empty,
+            origin: empty,
+            dir: empty,
+            end: [0.0; POINTS],
+        }
+    }
+}
+
+impl ShadingBatch {
+    /// Finds what `light` does at each point of a surface of `bsdf`, on which highlights may be narrow if it is
+    /// `shiny`; backs of what `has_inside`, which is shiny, are seen from inside. Of a wide light it is the `place`th
+    /// of those that each point has drawn.
+    pub(crate) fn shine(
+        &mut self,
+        (bsdf, shiny, has_inside): (&Bsdf, bool, bool),
+        light: &LocalLight,
+        place: Option<u32>,
+    ) {
+        let (found, lit, points) = (&self.found, &mut self.lit, padded(self.count));
+        let (painted, whole) = (&self.painted, &self.whole);
+        let overlays = self.overlays.as_deref().filter(|over| over.any());
+        let cones = shiny.then_some(&self.cones);
+        let drawn = place.map(|place| (&mut self.drawn, place));
+        match drawn {
+            None => self.level.run(Shine::<false> {
+                found,
+                lit,
+                points,
+                bsdf,
+                painted,
+                whole,
+                overlays,
+                cones,
+                has_inside,
+                light,
+                drawn,
+            }),
+            Some(_) => self.level.run(Shine::<true> {
+                found,
+                lit,
+                points,
+                bsdf,
+                painted,
+                whole,
+                overlays,
+                cones,
+                has_inside,
+                light,
+                drawn,
+            }),
+        }
+        if let Some(weights) = &self.weights {
+            self.level.run(Weigh { weights, radiance: &mut self.lit.radiance, points });
+        }
+        if place.is_some() {
+            for i in 0..points.min(POINTS) {
+                let part = get(&self.lit.radiance, i) * self.drawn.part(i);
+                put(&mut self.lit.radiance, i, part);
+            }
+        }
+        if self.weights.is_some() || place.is_some() {
+            for i in 0..points.min(POINTS) {
+                let radiance = get(&self.lit.radiance, i);
+                self.lit.seen[i] *= u32::from(radiance.is_finite() & (radiance.max_element() > 0.0));
+            }
+        }
+    }
+
+    /// The points that it shines on: the sample of each, and what it shows.
+    pub(crate) fn shone(&self) -> impl Iterator<Item = (u32, Vec3)> {
+        self.lit_as(|seen| seen != 0).map(|(i, radiance)| (self.samples[i], radiance))
+    }
+
+    /// Those of them whose shadow rays [`Self::send`] does not send: their numbers, and what they show.
+    pub(crate) fn grazed(&self) -> impl Iterator<Item = (usize, Vec3)> {
+        let any = self.lit.seen[..padded(self.count)].iter().fold(0, |all, seen| all | seen) & GRAZING != 0;
+        self.lit_as(move |seen| any && seen == GRAZING)
+    }
+
+    fn lit_as(&self, wanted: impl Fn(u32) -> bool) -> impl Iterator<Item = (usize, Vec3)> {
+        let points = (0..self.count.min(POINTS)).filter(move |&i| wanted(self.lit.seen[i]));
+        points.map(|i| (i, get(&self.lit.radiance, i)))
+    }
+
+    /// Leaves out the points whose shadow rays are not sent: asks for each, by the place of the ray that came to it in
+    /// what was traced, with its sample and what it shows.
+    pub(crate) fn choose(&mut self, mut sends: impl FnMut(usize, u32, &mut Vec3) -> bool) {
+        for i in 0..self.count.min(POINTS) {
+            if self.lit.seen[i] == 0 {
+                continue;
+            }
+            let mut radiance = get(&self.lit.radiance, i);
+            if sends(self.rays[i] as usize, self.samples[i], &mut radiance) {
+                put(&mut self.lit.radiance, i, radiance);
+            } else {
+                self.lit.seen[i] = 0;
+            }
+        }
+    }
+
+    /// Sends the shadow rays that start on their triangles, outside of everything where that matters.
+    pub(crate) fn send(&self, shadows: &mut ShadowQueue, absorbs: bool) {
+        let count = self.write(shadows.room());
+        shadows.take(count, std::iter::repeat_n(Media::default(), if absorbs { count } else { 0 }));
+    }
+
+    /// The same where each starts inside of what the rays of the points are inside of.
+    pub(crate) fn send_within(&self, shadows: &mut ShadowQueue, traced: TracedRays) {
+        let count = self.write(shadows.room());
+        let rays = self.rays.iter().zip(&self.lit.seen).filter(|(_, seen)| **seen == PLAIN);
+        shadows.take(count, rays.map(|(&ray, _)| traced.path(ray as usize).media).take(count));
+    }
+
+    /// Writes the shadow rays that start on their triangles; how many there are.
+    fn write(&self, (rays, light): (&mut [Ray; POINTS], &mut [Bound; POINTS])) -> usize {
+        let (prims, samples, lit) = (self.given.faces.prims(), &self.samples, &self.lit);
+        self.level.run(Send { points: self.count.min(POINTS), prims, samples, lit, rays, light })
+    }
+}
+
+struct Send<'a> {
+    points: usize,
+    prims: &'a [u32],
+    samples: &'a [u32; POINTS],
+    lit: &'a Lit,
+    rays: &'a mut [Ray; POINTS],
+    light: &'a mut [Bound; POINTS],
+}
+
+impl Kernel for Send<'_> {
+    /// How many rays there are.
+    type Output = usize;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> usize {
+        let Self { points, prims, samples, lit, rays, light: bound } = self;
+        let mut count = 0;
+        let eights = prims.as_chunks::<LANES>().0.iter().zip(samples.as_chunks::<LANES>().0);
+        for (k, (prims, samples)) in eights.enumerate().take(padded(points) / LANES) {
+            let eight = |column: &Column| column.as_chunks::<LANES>().0[k];
+            let three = |columns: &Columns| [eight(&columns[0]), eight(&columns[1]), eight(&columns[2])];
+            let there = (1 << (points - k * LANES).min(LANES)) - 1;
+            let which = s.find_word(PLAIN, &lit.seen.as_chunks().0[k]) & there;
+            if which == 0 {
+                continue;
+            }
+            let ([ox, oy, oz], [dx, dy, dz], end) = (three(&lit.origin), three(&lit.dir), eight(&lit.end));
+            let from = s.rows([s.load(&ox), s.load(&oy), s.load(&oz), s.splat(0.0)]);
+            let to = s.rows([s.load(&dx), s.load(&dy), s.load(&dz), s.load(&end)]);
+            let [r, g, b] = three(&lit.radiance);
+            // Numbers of samples only pass through the lanes, as bits.
+            let light = s.rows([s.load(&r), s.load(&g), s.load(&b), s.load(bytemuck::cast_ref(samples))]);
+            let mut put = |at: usize, i: usize| {
+                rays[at % POINTS] = Ray::from_fours([from[i], to[i]], prims[i], samples[i]);
+                bound[at % POINTS] = bytemuck::cast(light[i]);
+            };
+            if which == (1 << LANES) - 1 {
+                (0..LANES).for_each(|i| put(count + i, i));
+            } else {
+                (0..LANES).filter(|i| which >> i & 1 == 1).enumerate().for_each(|(j, i)| put(count + j, i));
+            }
+            count += which.count_ones() as usize;
+        }
+        count
+    }
+}
+
+/// Wide lights have a kernel of their own, which leaves the other one its lanes.
+struct Shine<'a, const AREA: bool> {
+    found: &'a Found,
+    lit: &'a mut Lit,
+    points: usize,
+    bsdf: &'a Bsdf,
+    painted: &'a Painted,
+    /// What points are made of that more changes than columns know.
+    whole: &'a [Bsdf],
+    /// What lies over points.
+    overlays: Option<&'a Overlays>,
+    /// Where highlights may be narrow.
+    cones: Option<&'a Cones>,
+    has_inside: bool,
+    light: &'a LocalLight,
+    /// What was drawn of it, and which of that counts, if it is wide.
+    drawn: Option<(&'a mut Drawn, u32)>,
+}
+
+impl<const AREA: bool> Kernel for Shine<'_, AREA> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { found, lit, points, bsdf, painted, whole, overlays, cones, has_inside, light, mut drawn } = self;
+        let (points, light) = (points.min(POINTS), *light);
+        let in_lux = matches!(bsdf.model, Model::MetalRough(_));
+        debug_assert_eq!(AREA, drawn.is_some());
+        let position = |i| get(&found.position, i);
+        match &mut drawn {
+            Some((drawn, place)) if AREA => {
+                let [x, y] = drawn.places(*place, points);
+                light.arriving_at(points, (position, |i| Some([x[i], y[i]])), |i, (incident, arrives)| {
+                    arrive(lit, i, (incident, arrives & drawn.has(i, *place)), in_lux);
+                    put(&mut drawn.ends, i, incident.position.unwrap_or(Vec3::ZERO));
+                });
+            }
+            _ => light.arriving_at(points, (position, |_| None), |i, it| arrive(lit, i, it, in_lux)),
+        }
+        // The model is chosen outside the loop, which then is a formula.
+        match &bsdf.model {
+            _ if !whole.is_empty() => reflect_with_lobes(found, lit, whole),
+            Model::Unlit(_) => lit.seen.fill(0),
+            Model::Phong(m) if painted.any => {
+                let m = *m;
+                let highlights = highlights(found, lit, points, |i| painted.phong(i, &m));
+                reflect(found, lit, points, |i, normal, _, to_light| {
+                    painted.phong(i, &m).lit_with(normal, to_light, highlights[i])
+                });
+            }
+            Model::Phong(m) if m.glows() => {
+                let m = *m;
+                let highlights = highlights(found, lit, points, |_| m);
+                reflect(found, lit, points, |i, normal, _, to_light| m.lit_with(normal, to_light, highlights[i]));
+            }
+            Model::Phong(m) => {
+                let m = *m;
+                reflect(found, lit, points, |_, normal, _, to_light| m.lit_with(normal, to_light, 0.0));
+            }
+            Model::MetalRough(m) => {
+                let m = *m;
+                match (painted.any, cones) {
+                    // What has overlays always has cones.
+                    (any, Some(cones)) if overlays.is_some() => {
+                        let least_square = &cones.least_square;
+                        if any {
+                            reflect_below(found, lit, points, |i, normal, view, to_light| {
+                                painted.metal_rough(i, &m).at_least(least_square[i]).lit(normal, view, to_light)
+                            });
+                        } else {
+                            reflect_below(found, lit, points, |i, normal, view, to_light| {
+                                m.at_least(least_square[i]).lit(normal, view, to_light)
+                            });
+                        }
+                        overlays.into_iter().for_each(|overlays| overlays.reflect(found, lit, points));
+                        keep_all(found, lit, points);
+                    }
+                    (true, Some(cones)) if has_inside => reflect(found, lit, points, |i, normal, view, to_light| {
+                        let m = painted.metal_rough(i, &m).at_least(cones.least_square[i]);
+                        m.lit_on_side(normal, view, to_light, found.front[i] == 1)
+                    }),
+                    (false, Some(cones)) if has_inside => reflect(found, lit, points, |i, normal, view, to_light| {
+                        let m = m.at_least(cones.least_square[i]);
+                        m.lit_on_side(normal, view, to_light, found.front[i] == 1)
+                    }),
+                    (true, Some(cones)) => reflect(found, lit, points, |i, normal, view, to_light| {
+                        painted.metal_rough(i, &m).at_least(cones.least_square[i]).lit(normal, view, to_light)
+                    }),
+                    (true, None) => reflect(found, lit, points, |i, normal, view, to_light| {
+                        painted.metal_rough(i, &m).lit(normal, view, to_light)
+                    }),
+                    (false, Some(cones)) => reflect(found, lit, points, |i, normal, view, to_light| {
+                        m.at_least(cones.least_square[i]).lit(normal, view, to_light)
+                    }),
+                    (false, None) => {
+                        reflect(found, lit, points, |_, normal, view, to_light| m.lit(normal, view, to_light));
+                    }
+                }
+            }
+        }
+        if !light.shadows {
+            return;
+        }
+        match (light.position(), drawn) {
+            (None, _) => start(found, lit, points, |_| None),
+            (_, Some((drawn, _))) if AREA => start(found, lit, points, |i| Some(get(&drawn.ends, i))),
+            (Some(position), _) => start(found, lit, points, |_| Some(position)),
+        }
+    }
+}
+
+/// Keeps the light that arrives at a point.
+#[inline(always)]
+fn arrive(lit: &mut Lit, i: usize, (incident, arrives): (Incident, bool), in_lux: bool) {
+    put(&mut lit.to_light, i, incident.to_light);
+    put(&mut lit.light, i, if in_lux { incident.irradiance() } else { incident.strength() });
+    lit.seen[i] = u32::from(arrives);
+}
+
+/// How bright Phong's highlight is at each point. Powers are found one by one, and only where there is something to see.
+#[inline(always)]
+fn highlights(found: &Found, lit: &Lit, points: usize, bsdf: impl Fn(usize) -> PhongBsdf) -> Column {
+    let mut highlights = [0.0; POINTS];
+    for (i, highlight) in highlights.iter_mut().enumerate().take(points) {
+        let (normal, to_light) = (get(&found.normal, i), get(&lit.to_light, i));
+        let agreement = PhongBsdf::agreement(normal, get(&found.view, i), to_light);
+        *highlight = if normal.dot(to_light) > 0.0 { agreement } else { 0.0 };
+    }
+    for (i, highlight) in highlights.iter_mut().enumerate().take(points) {
+        let m = bsdf(i);
+        if lit.seen[i] != 0 && m.glows() {
+            *highlight = m.highlight(*highlight);
+        }
+    }
+    highlights
+}
+
+/// Keeps what a point shows of a light that arrives, if that counts; it may lie above the horizon or below.
+#[inline(always)]
+fn keep(found: &Found, lit: &mut Lit, i: usize, (radiance, counts): (Vec3, bool), above: bool) {
+    let grazes = above & (found.curved[i] == 1) & (get(&found.geometric, i).dot(get(&lit.to_light, i)) < STEEP);
+    let seen = counts & radiance.is_finite() & (radiance.max_element() > 0.0) & (found.certain[i] == 1);
+    let how = if grazes { GRAZING } else { PLAIN };
+    lit.seen[i] *= if seen { how } else { 0 };
+    put(&mut lit.radiance, i, radiance);
+}
+
+/// What the points under overlays reflect of the light that arrives.
+#[inline(always)]
+fn reflect_below(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(usize, Vec3, Vec3, Vec3) -> Vec3) {
+    for i in 0..points.min(POINTS) {
+        let (normal, view, to_light) = (get(&found.normal, i), get(&found.view, i), get(&lit.to_light, i));
+        let radiance = share(i, normal, view, to_light) * get(&lit.light, i);
+        put(&mut lit.radiance, i, radiance);
+    }
+}
+
+/// Keeps what all points show of light that arrives from above.
+#[inline(always)]
+fn keep_all(found: &Found, lit: &mut Lit, points: usize) {
+    for i in 0..points.min(POINTS) {
+        let above = get(&found.horizon, i).dot(get(&lit.to_light, i)) > 0.0;
+        let radiance = get(&lit.radiance, i);
+        keep(found, lit, i, (radiance, above), above);
+    }
+}
+
+/// What points with more lobes reflect of the light that arrives, and what they let through.
+fn reflect_with_lobes(found: &Found, lit: &mut Lit, whole: &[Bsdf]) {
+    for (i, bsdf) in whole.iter().enumerate().take(POINTS) {
+        let (horizon, normal, view) = (get(&found.horizon, i), get(&found.normal, i), get(&found.view, i));
+        let (to_light, light) = (get(&lit.to_light, i), get(&lit.light, i));
+        let counts = (lit.seen[i] != 0) & (found.certain[i] == 1);
+        let above = horizon.dot(to_light) > 0.0;
+        let radiance = match (counts, above) {
+            (true, true) => bsdf.lit_with_lobes(horizon, normal, view, to_light, light),
+            (true, false) => bsdf.lit_through_lobes(normal, view, to_light, light),
+            (false, _) => Vec3::ZERO,
+        };
+        keep(found, lit, i, (radiance, counts), above);
+    }
+    lit.seen[whole.len().min(POINTS)..].fill(0);
+}
+
+/// What the points reflect of the light that arrives.
+#[inline(always)]
+fn reflect(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(usize, Vec3, Vec3, Vec3) -> Vec3) {
+    for i in 0..points.min(POINTS) {
+        let (horizon, normal, to_light) = (get(&found.horizon, i), get(&found.normal, i), get(&lit.to_light, i));
+        let above = horizon.dot(to_light) > 0.0;
+        let smooth = terminator(horizon, normal, to_light);
+        let radiance = share(i, normal, get(&found.view, i), to_light) * get(&lit.light, i) * smooth;
+        keep(found, lit, i, (radiance, above), above);
+    }
+}
+
+/// Where shadow rays start, and where they go.
+#[inline(always)]
+fn start(found: &Found, lit: &mut Lit, points: usize, light: impl Fn(usize) -> Option<Vec3>) {
+    let mut turned = 0;
+    for i in 0..points.min(POINTS) {
+        let (geometric, to_light) = (get(&found.geometric, i), get(&lit.to_light, i));
+        let origin = leave(found, i, to_light);
+        let (dir, end) = way(origin, to_light, light(i));
+        put(&mut lit.origin, i, origin);
+        put(&mut lit.dir, i, dir);
+        lit.end[i] = end;
+        turned |= u32::from((geometric.dot(to_light) < 0.0) != (geometric.dot(dir) < 0.0));
+    }
+    // A ray leaves on the side to which it goes; that is hardly ever another than that of the light.
+    if turned == 1 {
+        for i in 0..points.min(POINTS) {
+            put(&mut lit.origin, i, leave(found, i, get(&lit.dir, i)));
+        }
+    }
+}

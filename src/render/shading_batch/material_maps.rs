@@ -1,0 +1,544 @@
+//! Maps of a material and colours of vertices that points of a strip read side by side.
+
+use super::columns::{Column, Columns, Found, Given, LANES, POINTS, ShadingBatch, get, padded, put};
+use super::cones::Cones;
+use super::constants::{other_maps, reads_reflectance};
+use super::painted::Painted;
+use crate::math::simd::{Kernel, Simd};
+use crate::math::{Vec2, Vec3, Vec4};
+use crate::render::context::Context;
+use crate::render::patch::{FrameTurn, Turn, given_tangent, mixed_color, turned_by_texel, turning_of};
+use crate::render::shade::{MetalRoughInputs, PhongInputs, base_color, base_space, has_inside, is_cut_out, occlusion};
+use crate::render::surface::{facing, side_of};
+use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, changes};
+use crate::render::world::Placement;
+use crate::scene::{Material, Mesh, MetalRough, Reflection, TextureRef, UvTransform};
+
+/// What a map is read for.
+#[derive(Clone, Copy, Debug)]
+enum Slot {
+    Base,
+    Opacity,
+    Emission,
+    Occlusion,
+    Normal,
+    MetalRough,
+    Transmission,
+    Ambient,
+    Specular,
+    Shininess,
+}
+
+const SLOTS: usize = 10;
+
+/// What the maps of eight points say.
+type Texels = [[Vec4; LANES]; SLOTS];
+
+/// Coordinates that the maps of a material may have.
+const GROUPS: usize = 2;
+
+/// Maps of lobes and of reflectance that a material may have.
+pub(super) const LOBE_MAPS: usize = 11;
+
+/// What maps of lobes and of reflectance say at every point.
+pub(super) type LobeTexels = [[Vec4; POINTS]; LOBE_MAPS];
+
+/// The maps of a material.
+#[derive(Clone, Debug)]
+pub(crate) struct MaterialMaps {
+    groups: Vec<Group>,
+    /// The texture of the normal map, which is in the first group, and how its texels lie.
+    normal_map: Option<(u32, Layout)>,
+    /// Maps of lobes and of reflectance, by their places among [`LobeTexels`]; empty where these are not read here.
+    lobes: Vec<(TextureRef, ColorSpace)>,
+}
+
+/// Maps that have the same coordinates.
+#[derive(Clone, Debug)]
+struct Group {
+    uv_set: u32,
+    transform: UvTransform,
+    turn: Turn,
+    stacks: Vec<Stack>,
+    /// Textures by which the material is cut out, and what each is read for.
+    cuts: Vec<(Slot, u32)>,
+}
+
+/// Maps that are read in the same places.
+#[derive(Clone, Debug)]
+struct Stack {
+    layout: Layout,
+    maps: Vec<Map>,
+}
+
+/// A texture that is read in one way, and for what: mostly one thing, but occlusion often lies where metalness does.
+#[derive(Clone, Debug)]
+struct Map {
+    texture: u32,
+    space: ColorSpace,
+    slots: Vec<Slot>,
+    /// Places among [`LobeTexels`], where it belongs to lobes or reflectance.
+    lobes: Vec<usize>,
+}
+
+/// What something read from a map is for.
+#[derive(Clone, Copy)]
+enum For {
+    Slot(Slot),
+    Lobe(usize),
+}
+
+impl MaterialMaps {
+    /// `None` for materials whose maps have too many coordinates, and for those of which one is read in another way.
+    pub(super) fn of(material: &Material, store: &TextureStore) -> Option<Self> {
+        let maps = maps(material);
+        // How thick glass is does not matter where rays go through it; maps of lobes are read with these.
+        let others = |m: &MetalRough| usize::from(m.thickness_map.is_some()) + other_maps(m);
+        if maps.len() + material.metal_rough().map_or(0, others) < material.textures().count() {
+            return None;
+        }
+        let mut material_maps = Self { groups: Vec::new(), normal_map: None, lobes: Vec::new() };
+        if let Some((_, map, _)) = maps.iter().find(|(slot, ..)| matches!(slot, Slot::Normal)) {
+            material_maps.group(map)?;
+        }
+        for (slot, map, space) in maps {
+            let group = material_maps.group(map)?;
+            if is_cut_out(material) && matches!(slot, Slot::Base | Slot::Opacity) {
+                material_maps.groups[group].cuts.push((slot, map.texture));
+                if let Slot::Opacity = slot {
+                    continue;
+                }
+            }
+            let layout = Layout::of(store, map.texture)?;
+            material_maps.groups[group].add(layout, (For::Slot(slot), map.texture, space));
+            if let Slot::Normal = slot {
+                material_maps.normal_map = Some((map.texture, layout));
+            }
+        }
+        let with_lobes = material.metal_rough().and_then(|m| material_maps.clone().with_lobes(m, store));
+        Some(with_lobes.unwrap_or(material_maps))
+    }
+
+    /// The same with the maps of lobes; `None` where one of them is read in another way, or there are too many coordinates.
+    fn with_lobes(mut self, m: &MetalRough, store: &TextureStore) -> Option<Self> {
+        for (map, space) in lobe_maps(m) {
+            let layout = Layout::of(store, map.texture)?;
+            let group = self.group(map)?;
+            self.groups[group].add(layout, (For::Lobe(self.lobes.len()), map.texture, space));
+            self.lobes.push((*map, space));
+        }
+        Some(self)
+    }
+
+    /// The maps of lobes that it reads, by their places among [`LobeTexels`].
+    pub(super) fn lobes(&self) -> &[(TextureRef, ColorSpace)] {
+        &self.lobes
+    }
+
+    /// The group of a map; `None` where there is no room for one more.
+    fn group(&mut self, map: &TextureRef) -> Option<usize> {
+        let is_same = |group: &Group| (group.uv_set, group.transform) == (map.uv_set, map.transform);
+        let found = self.groups.iter().position(is_same);
+        if found.is_none() && self.groups.len() < GROUPS {
+            let turn = Turn::new(&map.transform);
+            let (uv_set, transform) = (map.uv_set, map.transform);
+            self.groups.push(Group { uv_set, transform, turn, stacks: Vec::new(), cuts: Vec::new() });
+            return Some(self.groups.len() - 1);
+        }
+        found
+    }
+
+    /// Whether there is something to read on a mesh, and it has what it takes.
+    pub(super) fn covers(&self, mesh: &Mesh) -> bool {
+        let turns = self.normal_map.is_some();
+        let colored = !mesh.colors.is_empty();
+        (colored || !self.groups.is_empty())
+            && (!colored || mesh.colors.len() == mesh.positions.len())
+            && self.groups.iter().all(|group| mesh.uvs.len() > group.uv_set as usize)
+            && !(turns && mesh.tangents.is_empty())
+    }
+
+    /// Whether it wants colours of corners there, or more than their coordinates of the first group.
+    pub(super) fn wants_extras(&self, mesh: &Mesh) -> bool {
+        !mesh.colors.is_empty() || self.groups.len() > 1
+    }
+
+    /// The coordinates of the corners for the `k`th group, but for the offset.
+    pub(super) fn coordinates(&self, k: usize, mesh: &Mesh, corners: [u32; 3]) -> [Vec2; 3] {
+        let Some(group) = self.groups.get(k) else { return [Vec2::ZERO; 3] };
+        let set = mesh.uvs.get(group.uv_set as usize);
+        let corner = |i: u32| set.and_then(|set| set.get(i as usize)).map_or(Vec2::ZERO, |&uv| group.turn.apply(uv));
+        corners.map(corner)
+    }
+}
+
+impl Group {
+    /// Reads what its maps say at so many of these spots; those of lobes and reflectance from `start` on, if they are wanted.
+    #[inline(always)]
+    fn read<S: Simd>(
+        &self,
+        s: S,
+        store: &TextureStore,
+        (places, spots): (&mut Places, &Spots),
+        (texels, points): (&mut Texels, usize),
+        (of_lobes, start, reads_lobes): (&mut LobeTexels, usize, bool),
+    ) {
+        for stack in &self.stacks {
+            let wanted = |map: &Map| reads_lobes || !map.slots.is_empty();
+            if !reads_lobes && !stack.maps.iter().any(wanted) {
+                continue;
+            }
+            places.find(&stack.layout, spots);
+            for map in stack.maps.iter().filter(|map| wanted(map)) {
+                places.prefetch(s, store, (map.texture, map.space));
+            }
+            for Map { texture, space, slots, lobes } in stack.maps.iter().filter(|map| wanted(map)) {
+                let mut read = [Vec4::ONE; LANES];
+                places.read(store, (*texture, *space), &mut read[..points]);
+                slots.iter().for_each(|&slot| texels[slot as usize] = read);
+                lobes.iter().for_each(|&lobe| of_lobes[lobe].as_chunks_mut().0[start / LANES] = read);
+            }
+        }
+        if !self.cuts.is_empty() {
+            self.cut(store, spots, texels, points);
+        }
+    }
+
+    /// Reads the numbers that cut the material out at so many of these spots.
+    #[inline(never)]
+    fn cut(&self, store: &TextureStore, spots: &Spots, texels: &mut Texels, points: usize) {
+        for &(slot, texture) in &self.cuts {
+            let texels = &mut texels[slot as usize];
+            if let Slot::Base = slot {
+                let alphas = store.channels::<3, LANES>(texture, &spots.uv, points);
+                texels.iter_mut().zip(alphas).for_each(|(texel, alpha)| texel.w = alpha);
+            } else {
+                let opacities = store.channels::<0, LANES>(texture, &spots.uv, points);
+                texels.iter_mut().zip(opacities).for_each(|(texel, opacity)| texel.x = opacity);
+            }
+        }
+    }
+
+    fn add(&mut self, layout: Layout, (what, texture, space): (For, u32, ColorSpace)) {
+        let known = self.stacks.iter().position(|stack| stack.layout == layout).unwrap_or_else(|| {
+            self.stacks.push(Stack { layout, maps: Vec::new() });
+            self.stacks.len() - 1
+        });
+        let maps = &mut self.stacks[known].maps;
+        let known = maps.iter().position(|map| (map.texture, map.space) == (texture, space)).unwrap_or_else(|| {
+            maps.push(Map { texture, space, slots: Vec::new(), lobes: Vec::new() });
+            maps.len() - 1
+        });
+        match what {
+            For::Slot(slot) => maps[known].slots.push(slot),
+            For::Lobe(lobe) => maps[known].lobes.push(lobe),
+        }
+    }
+}
+
+/// The maps that strips know, and what for.
+fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
+    let ([metal_rough, transmission], [ambient, specular, shininess]) = match &material.reflection {
+        Reflection::MetalRough(m) => ([&m.metal_rough_map, &m.transmission_map].map(Option::as_ref), [None; 3]),
+        Reflection::Phong(p) => ([None; 2], [&p.ambient_map, &p.specular_map, &p.shininess_map].map(Option::as_ref)),
+        Reflection::Unlit => ([None; 2], [None; 3]),
+    };
+    let all = [
+        (Slot::Base, material.base_color_map.as_ref(), base_space(material)),
+        (Slot::Opacity, material.opacity_map.as_ref(), ColorSpace::Linear),
+        (Slot::Emission, material.emission_map.as_ref(), ColorSpace::Srgb),
+        (Slot::Occlusion, material.occlusion_map.as_ref(), ColorSpace::Linear),
+        (Slot::Normal, material.normal_map.as_ref(), ColorSpace::Linear),
+        (Slot::MetalRough, metal_rough, ColorSpace::Linear),
+        (Slot::Transmission, transmission, ColorSpace::Linear),
+        (Slot::Ambient, ambient, ColorSpace::Srgb),
+        (Slot::Specular, specular, ColorSpace::Srgb),
+        (Slot::Shininess, shininess, ColorSpace::Linear),
+    ];
+    all.into_iter().filter_map(|(slot, map, space)| Some((slot, map?, space))).collect()
+}
+
+/// Maps of lobes and of reflectance, and what their numbers mean, but for that of the normals of clear coat. Where one gives a
+/// colour and with its alpha another number, it is named once.
+fn lobe_maps(m: &MetalRough) -> impl Iterator<Item = (&TextureRef, ColorSpace)> {
+    let both = |color, alpha| [(color, ColorSpace::Srgb), (alone(alpha, color), ColorSpace::Linear)];
+    let numbers = |maps: [_; 2]| maps.map(|map: &Option<TextureRef>| (map.as_ref(), ColorSpace::Linear));
+    let reflectance = both(m.specular_color_map.as_ref(), m.specular_map.as_ref());
+    let anisotropy = m.anisotropy.iter().map(|anisotropy| (anisotropy.map.as_ref(), ColorSpace::Linear));
+    let iridescence = m.iridescence.iter().flat_map(move |iridescence| numbers(iridescence.maps()));
+    let sheen = m.sheen.iter().flat_map(move |sheen| both(sheen.color_map.as_ref(), sheen.roughness_map.as_ref()));
+    let coat = m.coat.iter().flat_map(move |coat| numbers([&coat.strength_map, &coat.roughness_map]));
+    let through = m.diffuse_transmission.iter().flat_map(move |t| both(t.color_map.as_ref(), t.share_map.as_ref()));
+    let all = reflectance.into_iter().chain(through).chain(anisotropy).chain(iridescence).chain(sheen).chain(coat);
+    all.filter_map(|(map, space)| Some((map?, space)))
+}
+
+/// A map of which alpha counts, if its colour is not read anyway.
+fn alone<'a>(alpha: Option<&'a TextureRef>, color: Option<&TextureRef>) -> Option<&'a TextureRef> {
+    alpha.filter(|_| alpha != color)
+}
+
+impl ShadingBatch {
+    /// Reads what the maps of a sheet and the colours of vertices say at the points of a mesh that an instance has placed so, and
+    /// turns their normals. If lights show as highlights, which a normal map `widens`, it finds how far that turns them.
+    pub(super) fn read_sheet(
+        &mut self,
+        context: &Context,
+        (material, material_maps): (&Material, &MaterialMaps),
+        (mesh, placement): (&Mesh, &Placement),
+        widens: bool,
+    ) {
+        let count = self.count.min(POINTS);
+        let (smooth, colored) = (!mesh.normals.is_empty(), !mesh.colors.is_empty());
+        let Self { given, found, painted, of_lobes, cones, places, level, .. } = self;
+        let store = context.textures;
+        let reach = context.highlight_reach;
+        let turns = material_maps.normal_map.as_ref().filter(|_| widens).map(|map| (map, reach));
+        let front = &found.front;
+        // Lobes lie on the outside; how much is reflected counts on both sides.
+        let outside_alone = has_inside(material) && !material.metal_rough().is_some_and(reads_reflectance);
+        level.run(Read {
+            material_maps,
+            material,
+            store,
+            given,
+            front,
+            outside_alone,
+            cones,
+            painted,
+            of_lobes,
+            places,
+            turns,
+            colored,
+            count,
+        });
+        if material_maps.normal_map.is_some() {
+            let points = padded(count);
+            let scale = material.normal_scale;
+            let turn = material.normal_map.as_ref().and_then(|map| FrameTurn::new(mesh.tangents_along, map));
+            level.run(TurnNormals { given, found, painted, points, placement, smooth, scale, turn });
+        }
+    }
+}
+
+struct Read<'a> {
+    material_maps: &'a MaterialMaps,
+    material: &'a Material,
+    store: &'a TextureStore<'a>,
+    given: &'a Given,
+    front: &'a [u32; POINTS],
+    /// Whether maps of lobes count only where fronts are seen.
+    outside_alone: bool,
+    cones: &'a mut Cones,
+    painted: &'a mut Painted,
+    of_lobes: &'a mut LobeTexels,
+    places: &'a mut Places,
+    /// The normal map, where its changes count within such a reach.
+    turns: Option<(&'a (u32, Layout), f32)>,
+    colored: bool,
+    count: usize,
+}
+
+impl Kernel for Read<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let Self {
+            material_maps,
+            material,
+            store,
+            given,
+            front,
+            outside_alone,
+            cones,
+            painted,
+            of_lobes,
+            places,
+            turns,
+            colored,
+            count,
+        } = self;
+        for start in (0..count.min(POINTS)).step_by(LANES) {
+            let mut spots = Spots::default();
+            let mut texels: Texels = [[Vec4::ONE; LANES]; SLOTS];
+            let points = (count - start).min(LANES);
+            let reads_lobes = !outside_alone || front[start..start + points].contains(&1);
+            if let Some(group) = material_maps.groups.first() {
+                spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.uvs(i));
+                group.read(s, store, (places, &spots), (&mut texels, points), (of_lobes, start, reads_lobes));
+            }
+            for group in material_maps.groups.iter().skip(1) {
+                let mut spots = Spots::default();
+                spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.other_uvs(i));
+                group.read(s, store, (places, &spots), (&mut texels, points), (of_lobes, start, reads_lobes));
+            }
+            for i in start..start + points {
+                let vertex =
+                    if colored { mixed_color(given.faces.colors(i), given.corner_weights(i)) } else { Vec4::ONE };
+                inputs(painted, i, (material, vertex), |slot| texels[slot as usize][i - start]);
+            }
+            if let Some(((texture, layout), reach)) = turns {
+                let mut narrow = [false; LANES];
+                (0..points).for_each(|lane| narrow[lane] = painted.has_narrow_highlight(start + lane));
+                if narrow != [false; LANES] {
+                    let [along, across] = changes(store, (*texture, layout), &spots, reach, narrow);
+                    for lane in 0..points {
+                        cones.turning[start + lane] = turning_of([along[lane], across[lane]], material.normal_scale);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Finds where eight points from `start` on read maps with these coordinates at the corners, and how far around.
+#[inline(always)]
+fn spread(
+    spots: &mut Spots,
+    (given, cones): (&Given, &Cones),
+    (start, offset): (usize, Vec2),
+    uvs: impl Fn(usize) -> [Vec2; 3],
+) {
+    for lane in 0..LANES {
+        let i = start + lane;
+        let [a, b, c] = uvs(i);
+        let [along, across] = given.faces.gradients(i).of_coordinates([b - a, c - a], &cones.footprint(i));
+        let uv = given.mix(i, [a, b, c]) + offset;
+        (spots.uv[0][lane], spots.uv[1][lane]) = (uv.x, uv.y);
+        (spots.along[0][lane], spots.along[1][lane]) = (along.x, along.y);
+        (spots.across[0][lane], spots.across[1][lane]) = (across.x, across.y);
+    }
+}
+
+/// What maps and the colour of vertices make of a material at a point.
+#[inline(always)]
+fn inputs(painted: &mut Painted, i: usize, (material, vertex): (&Material, Vec4), texel: impl Fn(Slot) -> Vec4) {
+    let base = base_color(material, texel(Slot::Base), texel(Slot::Opacity).x, vertex);
+    painted.covered[i] = material.alpha_mode.covers(base.w);
+    let base = base.truncate();
+    painted.put_emission(i, material.emission * texel(Slot::Emission).truncate());
+    painted.put_normal_texel(i, texel(Slot::Normal).truncate());
+    match &material.reflection {
+        Reflection::Unlit => painted.put_unlit(i, base),
+        Reflection::Phong(p) => {
+            let [ambient, specular] = [Slot::Ambient, Slot::Specular].map(|slot| texel(slot).truncate());
+            painted.put_phong(i, PhongInputs::of(p, base, (ambient, specular, texel(Slot::Shininess).x)));
+        }
+        Reflection::MetalRough(m) => {
+            let open = occlusion(material, texel(Slot::Occlusion).x);
+            painted.put_metal_rough(
+                i,
+                MetalRoughInputs::of(m, base, open, [Slot::MetalRough, Slot::Transmission].map(texel).into()),
+            );
+        }
+    }
+}
+
+/// Turns normals by the texels of a normal map.
+struct TurnNormals<'a> {
+    given: &'a Given,
+    found: &'a mut Found,
+    painted: &'a Painted,
+    points: usize,
+    placement: &'a Placement,
+    smooth: bool,
+    scale: f32,
+    turn: Option<FrameTurn>,
+}
+
+impl Kernel for TurnNormals<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { given, found, painted, points, placement, smooth, scale, turn } = self;
+        let placement = *placement;
+        let mut turns = Turns::default();
+        for i in 0..points.min(POINTS) {
+            put(&mut turns.own, i, if smooth { given.own_normal(&placement, i) } else { given.faces.outward(i) });
+        }
+        for i in 0..points.min(POINTS) {
+            let tangent = given_tangent(&placement, given.mix(i, given.faces.tangents(i)), get(&turns.own, i));
+            let (tangent, sign) = tangent.unwrap_or((Vec3::NAN, 1.0));
+            put(&mut turns.tangent, i, tangent);
+            turns.sign[i] = sign;
+        }
+        if let Some(turn) = turn {
+            for i in 0..points.min(POINTS) {
+                let (own, frame) = (get(&turns.own, i), (get(&turns.tangent, i), turns.sign[i]));
+                let (tangent, sign) = turn.apply(frame, own);
+                put(&mut turns.tangent, i, tangent);
+                turns.sign[i] = sign;
+            }
+        }
+        for i in 0..points.min(POINTS) {
+            let (own, tangent) = (get(&turns.own, i), get(&turns.tangent, i));
+            let frame = [tangent, own.cross(tangent) * turns.sign[i]];
+            let turned = turned_by_texel(own, frame, painted.normal_texel(i), scale).unwrap_or(own);
+            put(&mut turns.turned, i, turned);
+        }
+        for i in 0..points.min(POINTS) {
+            let side = side_of(get(&turns.own, i), get(&found.geometric, i));
+            put(&mut found.normal, i, facing(get(&turns.turned, i) * side, get(&found.view, i)));
+            // Without a tangent it takes the coordinates around.
+            found.certain[i] &= u32::from(turns.tangent[0][i].is_finite());
+        }
+    }
+}
+
+/// The steps from a mesh's own normal to the turned one: in columns that nothing else can point at, so that compilers make
+/// lanes of each.
+struct Turns {
+    own: Columns,
+    tangent: Columns,
+    sign: Column,
+    turned: Columns,
+}
+
+impl Default for Turns {
+    fn default() -> Self {
+        let three = [[0.0; POINTS]; 3];
+        Self { own: three, tangent: three, sign: [0.0; POINTS], turned: three }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Bitmap, Pixels, Sampler, Scene, Texture};
+
+    #[test]
+    fn maps_with_two_kinds_of_coordinates_are_read_together_and_those_with_three_are_not() {
+        let pixels = Pixels::Rgb8(vec![90; 3].into());
+        let scene = Scene {
+            bitmaps: vec![Bitmap { name: String::new(), width: 1, height: 1, pixels }],
+            textures: vec![Texture { bitmap: 0, sampler: Sampler::default() }],
+            ..Scene::default()
+        };
+        let store = TextureStore::new(&scene);
+        let map = |uv_set| Some(TextureRef { texture: 0, uv_set, transform: UvTransform::default() });
+        let material = |sets: [u32; 3]| Material {
+            base_color_map: map(sets[0]),
+            emission_map: map(sets[1]),
+            normal_map: map(sets[2]),
+            ..Material::plain()
+        };
+        let groups = |sets| MaterialMaps::of(&material(sets), &store).map(|material_maps| material_maps.groups.len());
+        assert_eq!([[1; 3], [0, 1, 0], [0, 1, 2]].map(groups), [Some(1), Some(2), None]);
+        let material_maps = MaterialMaps::of(&material([0, 0, 1]), &store).expect("two");
+        assert!(material_maps.normal_map.is_some() && material_maps.groups[0].uv_set == 1, "it comes first");
+        let mut mesh = Mesh { positions: vec![Vec3::ZERO], uvs: vec![vec![Vec2::ZERO]], ..Mesh::default() };
+        mesh.tangents = vec![Vec4::X];
+        assert!(!material_maps.covers(&mesh), "it has one kind");
+        mesh.uvs.push(vec![Vec2::ONE]);
+        assert!(material_maps.covers(&mesh) && material_maps.wants_extras(&mesh));
+        mesh.colors = vec![Vec4::ONE; 2];
+        assert!(!material_maps.covers(&mesh), "not a colour for each corner");
+        let bare = MaterialMaps::of(&Material::plain(), &store).expect("nothing to read");
+        mesh.colors.pop();
+        assert!(bare.covers(&mesh) && bare.wants_extras(&mesh));
+        mesh.colors.clear();
+        assert!(!bare.covers(&mesh), "nothing");
+    }
+}

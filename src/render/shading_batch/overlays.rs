@@ -1,0 +1,258 @@
+//! Sheen and clear coat over the points of a strip.
+//!
+//! They leave what lies under them as it is: that is found side by side as if there were none, and so is what they take off it
+//! and add to it.
+
+use super::columns::{Column, Columns, Found, POINTS, ShadingBatch, get, put};
+use super::constants::MaterialConstants;
+use super::environment::{Surroundings, blur};
+use super::lit::Lit;
+use crate::math::Vec3;
+use crate::math::simd::{LANES, Simd};
+use crate::render::context::Context;
+use crate::render::shade::{CoatLobe, Model, SheenLobe, albedo_of_each, overlays, terminator};
+use crate::render::shade_hits::TracedRays;
+use crate::render::sky::Sky;
+use crate::render::world::Placement;
+use crate::scene::Mesh;
+
+/// Both of each point: those of their numbers that maps and views change.
+pub(super) struct Overlays {
+    /// Whether the material has them; else nothing here counts.
+    has_sheen: bool,
+    has_coat: bool,
+    /// [`SheenLobe`]; black where there is none.
+    color: Columns,
+    sheen_roughness: Column,
+    albedo: Column,
+    /// [`CoatLobe`]; without strength where there is none.
+    strength: Column,
+    coat_roughness: Column,
+    normal: Columns,
+    n_v: Column,
+    taken: Column,
+    occlusion: Column,
+    least_square: Column,
+    /// Where what one of them mirrors is looked for, and what is found there; shares of f0 and f90 in what a clear coat
+    /// sends back.
+    dirs: Columns,
+    light: Columns,
+    shares: [Column; 2],
+}
+
+impl Default for Overlays {
+    fn default() -> Self {
+        let (one, three) = ([0.0; POINTS], [[0.0; POINTS]; 3]);
+        Self {
+            has_sheen: false,
+            has_coat: false,
+            color: three,
+            sheen_roughness: one,
+            albedo: one,
+            strength: one,
+            coat_roughness: one,
+            normal: three,
+            n_v: one,
+            taken: one,
+            occlusion: one,
+            least_square: one,
+            dirs: three,
+            light: three,
+            shares: [one; 2],
+        }
+    }
+}
+
+impl ShadingBatch {
+    /// Finds the sheen and the clear coat at the points of a mesh that an instance has placed so, once their common maps
+    /// have been read and cones bent, if there is nothing else on them than these.
+    pub(crate) fn overlay(
+        &mut self,
+        context: &Context,
+        traced: TracedRays,
+        (mesh, placement): (&Mesh, &Placement),
+        common: &MaterialConstants,
+    ) {
+        let metal_rough = context.scene.materials[mesh.material as usize].metal_rough();
+        let (Some(m), Some(lobes)) = (metal_rough, common.lobes.filter(|lobes| lobes.are_overlays)) else { return };
+        let Model::MetalRough(even) = &common.bsdf.model else { return };
+        let even = even.inputs().occlusion;
+        let mut over = self.overlays.take().unwrap_or_default();
+        (over.has_sheen, over.has_coat) = (m.sheen.is_some(), m.coat.is_some());
+        self.each_lobe_frame(context, traced, (mesh, placement), (common, lobes), |i, on, reader| {
+            let Some(on) = on else { return over.put(i, &(None, None)) };
+            let occlusion = if self.painted.any { self.painted.occlusion[i] } else { even };
+            let (sheen, mut coat) = overlays(m, on, occlusion, reader);
+            if let Some(coat) = &mut coat {
+                self.widen_coat(i, context, m, coat, on.patch);
+            }
+            over.put(i, &(sheen, coat));
+        });
+        self.overlays = Some(over);
+    }
+}
+
+impl Overlays {
+    /// Forgets them.
+    pub(super) fn clear(&mut self) {
+        (self.has_sheen, self.has_coat) = (false, false);
+    }
+
+    /// Whether the material has any.
+    pub(super) fn any(&self) -> bool {
+        self.has_sheen || self.has_coat
+    }
+
+    fn put(&mut self, i: usize, (sheen, coat): &(Option<SheenLobe>, Option<CoatLobe>)) {
+        let SheenLobe { color, roughness, albedo } = *sheen.as_ref().unwrap_or(&SheenLobe::NONE);
+        put(&mut self.color, i, color);
+        (self.sheen_roughness[i], self.albedo[i]) = (roughness, albedo);
+        let coat = coat.as_ref().unwrap_or(&CoatLobe::NONE);
+        let CoatLobe { strength, roughness, normal, n_v, taken, occlusion, least_square } = *coat;
+        put(&mut self.normal, i, normal);
+        (self.strength[i], self.coat_roughness[i], self.n_v[i]) = (strength, roughness, n_v);
+        (self.taken[i], self.occlusion[i], self.least_square[i]) = (taken, occlusion, least_square);
+    }
+
+    #[inline(always)]
+    fn sheen(&self, i: usize) -> SheenLobe {
+        SheenLobe { color: get(&self.color, i), roughness: self.sheen_roughness[i], albedo: self.albedo[i] }
+    }
+
+    #[inline(always)]
+    fn coat(&self, i: usize) -> CoatLobe {
+        CoatLobe {
+            strength: self.strength[i],
+            roughness: self.coat_roughness[i],
+            normal: get(&self.normal, i),
+            n_v: self.n_v[i],
+            taken: self.taken[i],
+            occlusion: self.occlusion[i],
+            least_square: self.least_square[i],
+        }
+    }
+
+    /// What lies over point `i`.
+    pub(super) fn at(&self, i: usize) -> (Option<SheenLobe>, Option<CoatLobe>) {
+        let sheen = self.has_sheen.then(|| self.sheen(i)).filter(|sheen| sheen.color != Vec3::ZERO);
+        (sheen, self.has_coat.then(|| self.coat(i)).filter(|coat| coat.strength > 0.0))
+    }
+
+    /// Shares of what is under the clear coat, and under both, that are seen.
+    #[inline(always)]
+    fn clear_at(&self, i: usize) -> [f32; 2] {
+        let below_coat = if self.has_coat { self.coat(i).clear() } else { 1.0 };
+        let sheen = if self.has_sheen { self.sheen(i).clear() } else { 1.0 };
+        [below_coat, below_coat * sheen]
+    }
+
+    /// Makes of what points under them show of a light what is seen.
+    #[inline(always)]
+    pub(super) fn reflect(&self, found: &Found, lit: &mut Lit, points: usize) {
+        for i in 0..points.min(POINTS) {
+            let [_, clear] = self.clear_at(i);
+            let all = get(&lit.radiance, i) * clear;
+            put(&mut lit.radiance, i, all);
+        }
+        if self.has_sheen {
+            for i in 0..points.min(POINTS) {
+                let [below_coat, _] = self.clear_at(i);
+                let (normal, view, to_light) = (get(&found.normal, i), get(&found.view, i), get(&lit.to_light, i));
+                let sheen = self.sheen(i).lit(normal, view, to_light) * get(&lit.light, i) * below_coat;
+                let all = get(&lit.radiance, i) + sheen;
+                put(&mut lit.radiance, i, all);
+            }
+        }
+        for i in 0..points.min(POINTS) {
+            let smooth = terminator(get(&found.horizon, i), get(&found.normal, i), get(&lit.to_light, i));
+            let all = get(&lit.radiance, i) * smooth;
+            put(&mut lit.radiance, i, all);
+        }
+        if self.has_coat {
+            for i in 0..points.min(POINTS) {
+                let (coat, view, to_light) = (self.coat(i), get(&found.view, i), get(&lit.to_light, i));
+                let smooth = terminator(get(&found.horizon, i), coat.normal, to_light);
+                let all = get(&lit.radiance, i) + get(&lit.light, i) * (coat.lit(view, to_light) * smooth);
+                put(&mut lit.radiance, i, all);
+            }
+        }
+    }
+
+    /// Makes of what points under them show of their surroundings what is seen, with what they shine with themselves.
+    #[inline(always)]
+    pub(super) fn show<S: Simd>(
+        &mut self,
+        s: S,
+        found: &Found,
+        to: &mut Surroundings,
+        points: usize,
+        (sky, ambient): (&Sky, Vec3),
+        emission: impl Fn(usize) -> Vec3,
+    ) {
+        let points = points.min(POINTS);
+        for i in 0..points {
+            let [_, clear] = self.clear_at(i);
+            let all = get(&to.radiance, i) * clear;
+            put(&mut to.radiance, i, all);
+        }
+        if self.has_sheen {
+            self.show_sheen(found, to, points, (sky, ambient));
+        }
+        if self.has_coat {
+            self.show_coat(s, found, to, points, (sky, ambient));
+        }
+        for i in 0..points {
+            let [below_coat, _] = self.clear_at(i);
+            let all = emission(i) * below_coat + get(&to.radiance, i);
+            put(&mut to.radiance, i, all);
+        }
+    }
+
+    #[inline(always)]
+    fn show_sheen(&mut self, found: &Found, to: &mut Surroundings, points: usize, (sky, ambient): (&Sky, Vec3)) {
+        for i in 0..points {
+            put(&mut self.dirs, i, found.seen(i).mirrored());
+        }
+        let Self { dirs, light, sheen_roughness, .. } = self;
+        blur(sky, |i| SheenLobe::blur(sheen_roughness[i]), dirs, points, light);
+        for i in 0..points {
+            let [below_coat, _] = self.clear_at(i);
+            let sheen = self.sheen(i).around(get(&self.light, i) + ambient) * below_coat;
+            let all = get(&to.radiance, i) + sheen;
+            put(&mut to.radiance, i, all);
+        }
+    }
+
+    #[inline(always)]
+    fn show_coat<S: Simd>(
+        &mut self,
+        s: S,
+        found: &Found,
+        to: &mut Surroundings,
+        points: usize,
+        (sky, ambient): (&Sky, Vec3),
+    ) {
+        // Of what is as smooth as clear coat mostly is rays show all.
+        let looked_up = (0..points).fold(false, |any, i| any | (self.coat(i).looked_up() > 0.0));
+        if !looked_up {
+            return;
+        }
+        for i in 0..points {
+            let seen = found.seen(i);
+            let dir = self.coat(i).mirrored_from(&seen);
+            put(&mut self.dirs, i, dir);
+        }
+        let Self { dirs, light, coat_roughness, n_v, shares: [scale, bias], .. } = self;
+        blur(sky, |i| coat_roughness[i], dirs, points, light);
+        let at = coat_roughness.as_chunks().0.iter().zip(n_v.as_chunks().0);
+        let eights = scale.as_chunks_mut().0.iter_mut().zip(bias.as_chunks_mut().0);
+        for ((roughness, n_v), (scale, bias)) in at.zip(eights).take(points.div_ceil(LANES)) {
+            [*scale, *bias] = albedo_of_each(s, roughness, n_v);
+        }
+        for i in 0..points {
+            let share = self.coat(i).share_looked_up((self.shares[0][i], self.shares[1][i]));
+            let all = get(&to.radiance, i) + (get(&self.light, i) + ambient) * share;
+            put(&mut to.radiance, i, all);
+        }
+    }
+}

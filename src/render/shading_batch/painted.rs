@@ -1,0 +1,237 @@
+//! What maps and colours of vertices say at the points of a strip.
+//!
+//! They are mostly read side by side ([`MaterialMaps`](super::material_maps::MaterialMaps)), else point by point, as
+//! [`Surface`](crate::render::surface::Surface) reads them; what follows from them is computed side by side. So is what
+//! follows from how far rough surfaces on the way have blurred what is seen, which makes any material rougher.
+
+use super::columns::{Column, Columns, POINTS, ShadingBatch, get, padded, put};
+use super::constants::MaterialConstants;
+use crate::accel::NO_PRIM;
+use crate::math::Vec3;
+use crate::render::context::Context;
+use crate::render::patch::Patch;
+use crate::render::shade::{
+    Bsdf, MetalRoughBsdf, MetalRoughInputs, Model, PhongBsdf, PhongInputs, Reader, blurred, is_narrow,
+};
+use crate::render::shade_hits::TracedRays;
+use crate::render::surface::{HitPrim, mapped_normal, side_of};
+use crate::render::whitted::SPREAD;
+use crate::render::world::Placement;
+use crate::scene::{Material, Mesh};
+
+/// A material at each point: those of its numbers that maps change.
+pub(super) struct Painted {
+    /// Whether they do; else nothing here counts.
+    pub any: bool,
+    /// How much of each point is seen, where maps or vertices were read.
+    pub(super) covered: Column,
+    base: Columns,
+    emission: Columns,
+    metallic: Column,
+    pub(super) roughness: Column,
+    pub(super) occlusion: Column,
+    transmission: Column,
+    ambient: Columns,
+    specular: Columns,
+    mirror: Columns,
+    shininess: Column,
+    /// The texel of a normal map of a sheet.
+    normal: Columns,
+}
+
+impl Default for Painted {
+    fn default() -> Self {
+        let (one, three) = ([0.0; POINTS], [[0.0; POINTS]; 3]);
+        Self {
+            any: false,
+            covered: one,
+            base: three,
+            emission: three,
+            metallic: one,
+            roughness: one,
+            occlusion: one,
+            transmission: one,
+            ambient: three,
+            specular: three,
+            mirror: three,
+            shininess: one,
+            normal: three,
+        }
+    }
+}
+
+impl Painted {
+    fn put(&mut self, i: usize, bsdf: &Bsdf) {
+        self.put_emission(i, bsdf.emission);
+        match &bsdf.model {
+            Model::Unlit(color) => self.put_unlit(i, *color),
+            Model::Phong(m) => self.put_phong(i, m.inputs()),
+            Model::MetalRough(m) => self.put_metal_rough(i, m.inputs()),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn put_emission(&mut self, i: usize, emission: Vec3) {
+        put(&mut self.emission, i, emission);
+    }
+
+    #[inline(always)]
+    pub(super) fn put_unlit(&mut self, i: usize, color: Vec3) {
+        put(&mut self.base, i, color);
+    }
+
+    #[inline(always)]
+    pub(super) fn put_phong(&mut self, i: usize, inputs: PhongInputs) {
+        let PhongInputs { ambient, diffuse, specular, mirror, shininess } = inputs;
+        put(&mut self.ambient, i, ambient);
+        put(&mut self.base, i, diffuse);
+        put(&mut self.specular, i, specular);
+        put(&mut self.mirror, i, mirror);
+        self.shininess[i] = shininess;
+    }
+
+    #[inline(always)]
+    pub(super) fn put_metal_rough(&mut self, i: usize, inputs: MetalRoughInputs) {
+        let MetalRoughInputs { base, metallic, roughness, occlusion, transmission } = inputs;
+        put(&mut self.base, i, base);
+        (self.metallic[i], self.roughness[i], self.occlusion[i]) = (metallic, roughness, occlusion);
+        self.transmission[i] = transmission;
+    }
+
+    #[inline(always)]
+    pub(super) fn put_normal_texel(&mut self, i: usize, texel: Vec3) {
+        put(&mut self.normal, i, texel);
+    }
+
+    #[inline(always)]
+    pub(super) fn normal_texel(&self, i: usize) -> Vec3 {
+        get(&self.normal, i)
+    }
+
+    /// Whether lights show as narrow highlights of a metallic-rough material.
+    pub(super) fn has_narrow_highlight(&self, i: usize) -> bool {
+        is_narrow(self.roughness[i])
+    }
+
+    #[inline(always)]
+    pub(super) fn emission(&self, i: usize) -> Vec3 {
+        get(&self.emission, i)
+    }
+
+    /// What is seen of a material that no light changes.
+    #[inline(always)]
+    pub(super) fn unlit(&self, i: usize) -> Vec3 {
+        get(&self.base, i)
+    }
+
+    #[inline(always)]
+    pub(super) fn phong(&self, i: usize, of: &PhongBsdf) -> PhongBsdf {
+        of.painted(PhongInputs {
+            ambient: get(&self.ambient, i),
+            diffuse: get(&self.base, i),
+            specular: get(&self.specular, i),
+            mirror: get(&self.mirror, i),
+            shininess: self.shininess[i],
+        })
+    }
+
+    #[inline(always)]
+    pub(super) fn metal_rough(&self, i: usize, of: &MetalRoughBsdf) -> MetalRoughBsdf {
+        of.painted(MetalRoughInputs {
+            base: get(&self.base, i),
+            metallic: self.metallic[i],
+            roughness: self.roughness[i],
+            occlusion: self.occlusion[i],
+            transmission: self.transmission[i],
+        })
+    }
+}
+
+impl Painted {
+    /// A model at point `i`, which is `even` but for maps.
+    pub(super) fn model(&self, i: usize, even: &Model) -> Model {
+        match even {
+            Model::Unlit(_) => Model::Unlit(self.unlit(i)),
+            Model::Phong(m) => Model::Phong(self.phong(i, m)),
+            Model::MetalRough(m) => Model::MetalRough(self.metal_rough(i, m)),
+        }
+    }
+}
+
+impl ShadingBatch {
+    /// Blurs a surface of `bsdf` where it is seen along paths that rough surfaces have spread, after its maps were read.
+    pub(crate) fn blur(&mut self, traced: TracedRays, bsdf: &Bsdf) {
+        let (Model::MetalRough(m), TracedRays::Wave(..)) = (&bsdf.model, traced) else { return };
+        let rays = &self.rays[..self.count.min(POINTS)];
+        let scattered = |ray: u32| traced.path(ray as usize).scattered;
+        if rays.iter().all(|&ray| scattered(ray) <= SPREAD) {
+            return;
+        }
+        let painted = &mut self.painted;
+        if !painted.any {
+            painted.any = true;
+            for i in 0..padded(self.count) {
+                painted.put_emission(i, bsdf.emission);
+                painted.put_metal_rough(i, m.inputs());
+            }
+        }
+        for (roughness, &ray) in painted.roughness.iter_mut().zip(rays).filter(|(_, ray)| scattered(**ray) > SPREAD) {
+            *roughness = roughness.max(blurred(scattered(ray)));
+        }
+    }
+
+    /// Reads what maps and vertices say at the points of a mesh that an instance has placed so.
+    pub(crate) fn read(
+        &mut self,
+        context: &Context,
+        traced: TracedRays,
+        (mesh, placement): (&Mesh, &Placement),
+        common: &MaterialConstants,
+    ) {
+        let material = &context.scene.materials[mesh.material as usize];
+        self.painted.any = true;
+        let widens = !context.lights.is_empty() && material.metal_rough().is_some();
+        if let Some(material_maps) = common.material_maps.as_ref().filter(|material_maps| material_maps.covers(mesh)) {
+            self.read_sheet(context, (material, material_maps), (mesh, placement), widens);
+            return;
+        }
+        let (mut prim, mut patch) = (NO_PRIM, None);
+        for i in 0..self.count.min(POINTS) {
+            if self.found.certain[i] != 1 || common.one_sided && self.found.front[i] != 1 {
+                continue;
+            }
+            let hit = &traced.hits()[self.rays[i] as usize];
+            if prim != hit.prim {
+                prim = hit.prim;
+                patch = HitPrim::new(context.scene, context.world, prim).patch(context.world, hit.u, hit.v, Vec3::ZERO);
+            }
+            let Some(patch) = &mut patch else {
+                self.found.certain[i] = 0;
+                continue;
+            };
+            patch.move_to([1.0 - hit.u - hit.v, hit.u, hit.v], self.cones.footprint(i));
+            self.read_at(i, context, material, patch, widens);
+        }
+    }
+
+    fn read_at(&mut self, i: usize, context: &Context, material: &Material, patch: &Patch, widens: bool) {
+        let reader = Reader { store: context.textures, patch: Some(patch), known: &[] };
+        let base = reader.base(material);
+        self.painted.covered[i] = material.alpha_mode.covers(base.w);
+        if self.painted.covered[i] <= 0.0 {
+            return;
+        }
+        self.painted.put(i, &Bsdf::read(material, base.truncate(), &reader));
+        if material.normal_map.is_some() || material.bump_map.is_some() {
+            let (view, geometric) = (get(&self.found.view, i), get(&self.found.geometric, i));
+            let outward = if self.found.front[i] == 1 { geometric } else { -geometric };
+            let own = patch.normal().unwrap_or(outward);
+            let normal = mapped_normal(patch, material, context.textures, own, side_of(own, geometric), view);
+            put(&mut self.found.normal, i, normal);
+        }
+        if let Some(map) = material.normal_map.as_ref().filter(|_| widens && self.painted.has_narrow_highlight(i)) {
+            let reach = context.highlight_reach;
+            self.cones.turning[i] = patch.turning_of_map(map, material.normal_scale, context.textures, reach);
+        }
+    }
+}

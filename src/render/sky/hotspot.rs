@@ -1,0 +1,158 @@
+//! The hotspot: the small and bright part of a panorama, a sun as a rule, which few of the rays that rough surfaces spread
+//! would meet.
+//!
+//! What a panorama has beyond a cap that all of it but a small part stays below is drawn by its light; the rest is calm, and seen
+//! by rays that go anywhere.
+
+use super::Sky;
+use super::distribution::{COLUMNS, EnvironmentDistribution};
+use super::panorama::Pyramid;
+use crate::math::Vec3;
+use std::f64::consts::PI;
+
+/// So much of the sphere lies beyond the cap at most, sr: a sun with what shines around it, 9° across.
+const MOST: f32 = 0.02;
+
+/// What hotspot must have of all the light to be worth rays of its own.
+const LEAST: f64 = 0.01;
+
+#[derive(Clone, Debug)]
+pub(super) struct Hotspot {
+    /// What lies below the cap.
+    without: Pyramid,
+    /// Of what lies beyond.
+    chance: EnvironmentDistribution,
+    /// How much of the sphere an even light would cover that is as bright and as much, sr.
+    area: f32,
+    /// Mean over the sphere of the greatest channel of what is calm.
+    calm_mean: f32,
+}
+
+impl Hotspot {
+    /// That of a panorama, if it has any.
+    pub(super) fn of(pyramid: &Pyramid) -> Option<Self> {
+        let level = pyramid.at_most(COLUMNS);
+        let mut each: Vec<(Vec3, f32)> = level.each().collect();
+        each.sort_unstable_by(|(a, _), (b, _)| b.max_element().total_cmp(&a.max_element()));
+        let (mut area, mut cap) = (0.0, 0.0);
+        for (light, more) in each {
+            cap = light.max_element();
+            if area + more > MOST {
+                break;
+            }
+            area += more;
+        }
+        let capped = |light: Vec3| if light.max_element() > cap { light * (cap / light.max_element()) } else { light };
+        let beyond = |light: Vec3| light - capped(light);
+        // Squares of what is very bright or dim are no single floats.
+        let sum = |light: Vec3| f64::from(light.element_sum());
+        let sum_of = |part: &dyn Fn(Vec3) -> f64| -> f64 {
+            level.each().map(|(light, area)| part(light) * f64::from(area)).sum()
+        };
+        let (hotspot, all) = (sum_of(&|light| sum(beyond(light))), sum_of(&sum));
+        let squares = sum_of(&|light| sum(beyond(light)).powi(2));
+        #[expect(clippy::cast_possible_truncation, reason = "an area and a mean")]
+        let (area, calm_mean) = (
+            (hotspot * hotspot / squares) as f32,
+            (sum_of(&|light| f64::from(capped(light).max_element())) / (4.0 * PI)) as f32,
+        );
+        (hotspot > LEAST * all && all.is_finite() && squares.is_finite()).then(|| Self {
+            without: Pyramid::sharp(level.with(capped)),
+            chance: EnvironmentDistribution::new(level.with(beyond), 0.0),
+            area,
+            calm_mean,
+        })
+    }
+}
+
+impl Sky {
+    /// Finds the hotspot of a picture, for surfaces that spread rays.
+    pub(crate) fn find_glare(&mut self) {
+        if let Some(map) = &mut self.map {
+            map.hotspot = Hotspot::of(&map.pyramid);
+        }
+    }
+
+    /// How much of the sphere hotspot covers, sr, were it even; `None`: there is none.
+    pub(crate) fn hotspot(&self) -> Option<f32> {
+        self.map.as_ref().and_then(|map| map.hotspot.as_ref()).map(|hotspot| hotspot.area)
+    }
+
+    /// Whether light is worth a ray to hotspot that adds it, where what weighs less than `cutoff` is not: beside what is calm.
+    pub(crate) fn is_worth_a_ray(&self, light: Vec3, cutoff: f32) -> bool {
+        /// Much less than a weight, as suns are bright.
+        const PART: f32 = 1.0 / 16.0;
+        let calm = self.map.as_ref().and_then(|map| map.hotspot.as_ref()).map_or(0.0, |hotspot| hotspot.calm_mean);
+        light.max_element() > PART * cutoff * calm
+    }
+
+    /// A direction to hotspot, drawn with two numbers from 0 … 1, and its radiance over the density of drawing it.
+    pub(crate) fn to_glare(&self, at: [f32; 2]) -> Option<(Vec3, Vec3)> {
+        let map = self.map.as_ref()?;
+        let chance = &map.hotspot.as_ref()?.chance;
+        let dir = chance.draw(at);
+        let (radiance, density) = chance.look(dir);
+        (density > 0.0).then(|| (self.to_world(map, dir), radiance / density))
+    }
+
+    /// Radiance along a unit direction without hotspot, averaged over a cone of this angle across (radians).
+    pub(crate) fn without_hotspot(&self, dir: Vec3, angle: f32) -> Vec3 {
+        match self.map.as_ref().and_then(|map| map.hotspot.as_ref().map(|hotspot| (map, hotspot))) {
+            Some((map, hotspot)) => hotspot.without.radiance(self.to_map(map, dir), angle),
+            None => self.radiance(dir, angle),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::panorama::Level;
+    use super::*;
+    use crate::scene::{Environment, Panorama, Scene};
+    use std::sync::Arc;
+
+    /// A sky that is darker below, and a sun so many degrees across.
+    fn sky(degrees: f32, strength: f32) -> Sky {
+        let (width, height) = (512, 256);
+        let sun = Vec3::new(0.55, 0.62, 0.45).normalize();
+        let texel = |dir: Vec3| {
+            let sunny = sun.angle_between(dir).to_degrees() < 0.5 * degrees;
+            Vec3::new(0.3, 0.4, 0.5 + 0.2 * dir.y)
+                + if sunny { Vec3::new(1.0, 0.9, 0.8) * strength } else { Vec3::ZERO }
+        };
+        let grid = Level::without_texels((width, height));
+        let texels = Arc::new(grid.middles().map(|(_, dir)| texel(dir).to_array()).collect());
+        let panorama = Panorama { name: String::new(), width, height, texels, rotation: 0.7 };
+        let mut sky =
+            Sky::new(&Scene { environment: Environment::Panorama, panorama: Some(panorama), ..Scene::default() });
+        sky.find_glare();
+        sky
+    }
+
+    #[test]
+    fn a_sun_is_glare_and_a_wide_or_a_weak_light_is_not() {
+        let area = sky(3.0, 1000.0).hotspot().expect("a sun");
+        let sun = 2.0 * std::f32::consts::PI * (1.0 - libm::cosf(1.5_f32.to_radians()));
+        assert!((area / sun - 1.0).abs() < 0.15, "{area} of {sun}");
+        assert_eq!((sky(40.0, 1000.0).hotspot(), sky(3.0, 1.0).hotspot(), sky(3.0, 0.0).hotspot()), (None, None, None));
+    }
+
+    #[test]
+    fn what_is_drawn_and_what_is_calm_are_together_all_the_light_of_a_picture() {
+        let sky = sky(3.0, 1000.0);
+        let count = 20_000_u16;
+        let at = |k: u16| [(f32::from(k) + 0.5) / f32::from(count), (f32::from(k) * 0.618_034).fract()];
+        let drawn = (0..count).filter_map(|k| sky.to_glare(at(k))).map(|(_, light)| light).sum::<Vec3>();
+        let drawn = drawn / f32::from(count);
+        let over = |seen: &dyn Fn(Vec3) -> Vec3| -> Vec3 {
+            let grid = Level::without_texels((1024, 512));
+            grid.middles().map(|(row, dir)| seen(dir) * grid.area(row)).sum()
+        };
+        let (calm, all) = (over(&|dir| sky.without_hotspot(dir, 0.0)), over(&|dir| sky.radiance(dir, 0.0)));
+        assert!((drawn + calm - all).abs().max_element() < 0.01 * all.min_element(), "{drawn} + {calm} is not {all}");
+        assert!(drawn.min_element() > 1.0 && calm.max_element() < 10.0, "{drawn}, {calm}");
+        let off =
+            (0..count).filter_map(|k| sky.to_glare(at(k))).map(|(dir, _)| sky.without_hotspot(dir, 0.0).max_element());
+        assert!(off.fold(0.0, f32::max) < 1.0, "nothing of the sun is calm");
+    }
+}

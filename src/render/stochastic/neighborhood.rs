@@ -1,0 +1,308 @@
+//! What the pixels beside a pixel tell about it.
+//!
+//! Most of a picture is so even that few samples of a pixel do. That these are enough is told by those of the eight pixels
+//! beside it: all must agree. What is thinner than a pixel, a wire or the stroke of a letter, shows in some of the pixels that
+//! it crosses and not in others; so wherever a pixel that was looked at closer turns out to be uneven, all near it are
+//! looked at as closely, and those near them if they are uneven, too ([`Neighborhood::reopen`]).
+
+use super::first::First;
+use super::pixel::Pixel;
+use super::variances::Variances;
+use crate::render::certainty::{Certainty, Even, GROUPS, Range, Seen, Shown};
+use crate::render::tile::{End, PixelFacts, Tile};
+
+/// How many columns and rows from a pixel others are looked at as closely: from one on an edge, and from one with something
+/// thin, of which the next pixels may well show nothing.
+const REACH: [u32; 2] = [1, 4];
+
+/// The number of no pixel.
+const NONE: u32 = u32::MAX;
+
+/// What the samples of a tile and of the pixels around it show.
+pub(super) struct Neighborhood {
+    /// All of these pixels.
+    pub tile: Tile,
+    /// What single samples show, row by row, with a place on every side where there is nothing.
+    pub shown: Shown,
+    /// Numbers of pixels that have more of them, or none yet, likewise.
+    numbers: Vec<u32>,
+    /// What those pixels show, by number.
+    seen: Vec<Seen>,
+    /// How much samples vary, place by place; a single one that looks as all beside it does not.
+    variances: Variances,
+}
+
+impl Neighborhood {
+    /// What these first samples show of the pixels of a tile.
+    pub(super) fn new(tile: Tile, first: &[&First]) -> Self {
+        let columns = (tile.x1 - tile.x0 + 2) as usize;
+        let places = columns * (tile.y1 - tile.y0 + 2) as usize;
+        let (shown, variances) = (Shown::nothing(places), Variances::nothing(columns));
+        let mut around = Self { tile, shown, numbers: vec![NONE; places], seen: Vec::new(), variances };
+        first.iter().for_each(|first| first.show(&mut around));
+        around.variances.begin(around.shown.known());
+        around
+    }
+
+    /// Places in a row.
+    pub(super) fn columns(&self) -> usize {
+        (self.tile.x1 - self.tile.x0 + 2) as usize
+    }
+
+    /// The place of a pixel.
+    pub(super) fn at(&self, (x, y): (u32, u32)) -> usize {
+        (y - self.tile.y0 + 1) as usize * self.columns() + (x - self.tile.x0 + 1) as usize
+    }
+
+    /// Which of these pixels that have one sample are done, and how certain they are then: those that look as all beside them.
+    pub(super) fn even(&self, judge: &Certainty, tile: Tile) -> Even {
+        // With what lies between the rows, which is quicker than row by row.
+        let (first, last) = (self.at((tile.x0, tile.y0)), self.at((tile.x1 - 1, tile.y1 - 1)));
+        judge.compare(&self.shown, self.columns(), first..last + 1)
+    }
+
+    /// Knows a pixel by its number, all smaller ones of which are known.
+    pub(super) fn know(&mut self, pixel: (u32, u32), number: usize) {
+        let at = self.at(pixel);
+        self.numbers[at] = u32::try_from(number).unwrap_or(NONE);
+        self.seen.push(self.shown.at(at));
+        self.variances.learn(at, 0.0);
+    }
+
+    /// What is seen at a place and beside it.
+    fn near(&self, at: usize) -> impl Iterator<Item = Seen> + Clone {
+        let rows = [at - self.columns(), at, at + self.columns()];
+        let places = rows.into_iter().flat_map(|middle| middle - 1..middle + 2);
+        places.map(|at| self.seen.get(self.numbers[at] as usize).copied().unwrap_or_else(|| self.shown.at(at)))
+    }
+
+    /// What the samples at a pixel and beside it lie between.
+    pub(super) fn range(&self, pixel: (u32, u32)) -> Range {
+        self.near(self.at(pixel)).fold(Range::NOTHING, |all, seen| all.with(seen.range))
+    }
+
+    /// Looks at the samples of these pixels, of which each has as many, up to as many as there are groups.
+    pub(super) fn see(&mut self, judge: &Certainty, pixels: &[Pixel], some: &[usize]) {
+        let mut each = some.iter();
+        judge.see_each(some.iter().map(|&i| pixels[i].taken()), |seen| {
+            each.next().into_iter().for_each(|&i| self.seen[i] = *seen);
+        });
+        for &i in some {
+            self.variances.learn(self.at(pixels[i].at), pixels[i].variance_of(self.seen[i].error));
+        }
+    }
+
+    /// Finds out how certain the means of these pixels are, which have samples in each group.
+    ///
+    /// The few samples that see a light, or what glass shows of it, make both the mean of a pixel and what tells its error:
+    /// where hardly any did, it looks dark and certain. So its samples are taken to vary no less than those of the pixels
+    /// beside it.
+    pub(super) fn look(&mut self, judge: &Certainty, pixels: &mut [Pixel], some: &[usize], errors: &mut Vec<f32>) {
+        errors.clear();
+        judge.each_standard_error(some.iter().map(|&i| &pixels[i].groups[..]), |error| errors.push(error));
+        for (&i, &error) in some.iter().zip(&*errors) {
+            let variance = pixels[i].learn(error);
+            self.variances.learn(self.at(pixels[i].at), variance);
+        }
+        for &i in some {
+            let pixel = &mut pixels[i];
+            // What is not certain by itself is not with those beside it, either.
+            if pixel.used(judge) <= 1.0 {
+                self.compare(pixel);
+                pixel.look(judge);
+            }
+        }
+    }
+
+    /// Takes a pixel's samples to vary no less than those of the pixels beside it.
+    pub(super) fn compare(&self, pixel: &mut Pixel) {
+        if let Some(own) = pixel.variance() {
+            pixel.take_to_vary(self.variances.no_less_than(own, self.at(pixel.at)));
+        }
+    }
+
+    /// The pixels of `tile` beside some that seemed certain with so many samples or fewer, and are not, now that more is known
+    /// of these.
+    pub(super) fn late(
+        &self,
+        judge: &Certainty,
+        pixels: &mut [Pixel],
+        (some, samples): (&[usize], u32),
+        tile: Tile,
+    ) -> Vec<usize> {
+        let (mut late, mut asked) = (Vec::new(), vec![false; pixels.len()]);
+        for &pixel in some {
+            let (x, y) = pixels[pixel].at;
+            for y in y.saturating_sub(1).max(tile.y0)..(y + 2).min(tile.y1) {
+                for x in x.saturating_sub(1).max(tile.x0)..(x + 2).min(tile.x1) {
+                    let number = self.numbers[self.at((x, y))] as usize;
+                    let Some(stopped) = pixels.get_mut(number) else { continue };
+                    let PixelFacts { end, count, error, .. } = stopped.facts;
+                    if std::mem::replace(&mut asked[number], true) || end != End::Met || count > samples {
+                        continue;
+                    }
+                    self.compare(stopped);
+                    if stopped.facts.error > error && stopped.used(judge) > 1.0 {
+                        (stopped.facts.end, stopped.facts.spare) = (End::Open, 0);
+                        late.push(number);
+                    }
+                }
+            }
+        }
+        late
+    }
+
+    /// Opens the pixels of `tile` that were done with so many samples and lie near uneven ones of these: those of one, which
+    /// have no numbers yet, and those of more, which have; their numbers.
+    pub(super) fn reopen(
+        &mut self,
+        judge: &Certainty,
+        pixels: &mut Vec<Pixel>,
+        (some, samples): (&[usize], u32),
+        tile: Tile,
+        open: impl Fn((u32, u32)) -> Pixel,
+    ) -> Vec<usize> {
+        let mut opened = Vec::new();
+        for &pixel in some {
+            let own = self.seen[pixel].range;
+            if judge.agree(&own) {
+                continue;
+            }
+            let (x, y) = pixels[pixel].at;
+            let reach = REACH[usize::from(judge.is_thin(&own, self.near(self.at((x, y)))))];
+            for y in y.saturating_sub(reach).max(tile.y0)..(y + reach + 1).min(tile.y1) {
+                for x in x.saturating_sub(reach).max(tile.x0)..(x + reach + 1).min(tile.x1) {
+                    let mut number = self.numbers[self.at((x, y))] as usize;
+                    match pixels.get_mut(number) {
+                        Some(pixel) if pixel.is_done_with(samples) => pixel.facts.end = End::Open,
+                        Some(_) => continue,
+                        None => {
+                            number = pixels.len();
+                            self.know((x, y), number);
+                            pixels.push(open((x, y)));
+                        }
+                    }
+                    opened.push(number);
+                }
+            }
+        }
+        opened
+    }
+
+    /// Finds the pixels of these that are done: their samples and those of the pixels beside them agree each among
+    /// themselves, and both are of the same colours. Of the others it finds the contrast around them.
+    pub(super) fn judge(&self, judge: &Certainty, pixels: &mut [Pixel], some: &[usize]) {
+        for &i in some {
+            let (own, pixel) = (&self.seen[i], &mut pixels[i]);
+            let (near, samples) = (self.near(self.at(pixel.at)), pixel.facts.count);
+            let is_calm = |seen: Seen| judge.agree(&seen.range) && !judge.differ(own.color, seen.color, samples);
+            if samples < GROUPS as u32 && pixel.firefly == 0.0 && near.clone().all(is_calm) {
+                pixel.done(own.error);
+            } else {
+                pixel.facts.error = own.error;
+                pixel.surround(judge, &self.range(pixel.at));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::render::certainty::factor;
+    use crate::render::whitted::Sample;
+
+    const TILE: Tile = Tile { x0: 4, y0: 7, x1: 7, y1: 10 };
+
+    fn judge() -> Certainty<'static> {
+        Certainty::new(None, (None, false), false, 0.05, factor(0.95))
+    }
+
+    /// The pixels of a tile, each with so many samples, every other one of them this much lighter.
+    fn pixels(tile: Tile, samples: usize, step: impl Fn((u32, u32)) -> f32) -> (Neighborhood, Vec<Pixel>) {
+        let (mut around, mut pixels) = (Neighborhood::new(tile, &[]), Vec::new());
+        for at in tile.places() {
+            let mut pixel = Pixel::new(3, at, false);
+            let light = |k: usize| Vec3::splat(step(at) * (k % 2) as f32);
+            let each = (0..samples).map(|k| Sample { radiance: light(k), through: Vec3::ZERO });
+            pixel.take(&each.collect::<Vec<_>>(), &[], 1);
+            around.know(at, pixels.len());
+            pixels.push(pixel);
+        }
+        (around, pixels)
+    }
+
+    fn look(around: &mut Neighborhood, pixels: &mut [Pixel], some: &[usize]) {
+        around.look(&judge(), pixels, some, &mut Vec::new());
+    }
+
+    /// The standard error of eight samples, four each of 0 and `step`.
+    fn error(step: f32) -> f32 {
+        (step * step / 4.0 / 7.0).sqrt()
+    }
+
+    /// What a pixel is told its error is, when all have been looked at.
+    fn told((around, pixels): &mut (Neighborhood, Vec<Pixel>), pixel: usize) -> f32 {
+        let all: Vec<usize> = (0..pixels.len()).collect();
+        look(around, pixels, &all);
+        around.compare(&mut pixels[pixel]);
+        pixels[pixel].facts.error
+    }
+
+    #[test]
+    fn what_varies_less_than_all_around_it_is_no_more_certain_than_that() {
+        for (step, certain) in [(0.0, true), (0.02, true), (0.5, false)] {
+            let mut nine = pixels(TILE, GROUPS, |at| if at == (5, 8) { 0.0 } else { step });
+            let told = told(&mut nine, 4);
+            assert!((told - error(step)).abs() < 1e-6, "{step}: {told}");
+            assert_eq!(nine.1[4].facts.end == End::Met, certain, "{step}: {told}");
+        }
+    }
+
+    #[test]
+    fn an_edge_beside_a_pixel_tells_nothing_of_it() {
+        let light = |(x, y): (u32, u32)| if x == 4 || y == 7 && x < 7 { 0.0 } else { 0.5 };
+        let mut nine = pixels(TILE, GROUPS, |at| if at == (5, 8) { 0.0 } else { light(at) });
+        assert_eq!(told(&mut nine, 4), 0.0);
+        // In a corner of a picture there are three beside it.
+        let mut nine = pixels(TILE, GROUPS, |at| if at == (6, 9) { 0.0 } else { light(at) });
+        assert!((told(&mut nine, 8) - error(0.5)).abs() < 1e-6);
+    }
+
+    /// As at the border of a tile, whose pixels alone get more samples.
+    #[test]
+    fn four_samples_of_the_pixels_around_a_tile_tell_how_much_they_vary() {
+        let (mut around, mut pixels) = pixels(TILE, 4, |_| 0.5);
+        around.see(&judge(), &pixels, &[0, 1, 2, 3, 5, 6, 7, 8]);
+        pixels[4].take(&[Sample { radiance: Vec3::ZERO, through: Vec3::ZERO }; 4], &[], 1);
+        pixels[4].learn(0.0);
+        around.compare(&mut pixels[4]);
+        // Of 0 and ½, two each.
+        let (told, expected) = (pixels[4].facts.error, (0.25_f32 / 3.0 / 8.0).sqrt());
+        assert!((told - expected).abs() < 1e-6, "{told}");
+    }
+
+    #[test]
+    fn of_two_pixels_beside_one_in_a_single_row_an_edge_is_not_the_rule() {
+        let mut row = pixels(Tile { y1: 8, ..TILE }, GROUPS, |(x, _)| if x == 6 { 0.5 } else { 0.0 });
+        assert_eq!(told(&mut row, 1), 0.0);
+    }
+
+    #[test]
+    fn a_pixel_that_was_certain_goes_on_when_those_around_it_turn_out_not_to_be() {
+        let judge = judge();
+        let (mut around, mut pixels) = pixels(TILE, GROUPS, |_| 0.0);
+        look(&mut around, &mut pixels, &(0..9).collect::<Vec<_>>());
+        let some: Vec<usize> = (0..9).filter(|&i| i != 4).collect();
+        assert!(around.late(&judge, &mut pixels, (&some, 16), TILE).is_empty());
+        for &i in &some {
+            pixels[i].join_groups();
+            pixels[i].take(&[Sample { radiance: Vec3::ONE, through: Vec3::ZERO }; GROUPS], &[], 2);
+            pixels[i].facts.end = End::Open;
+        }
+        look(&mut around, &mut pixels, &some);
+        assert_eq!(around.late(&judge, &mut pixels, (&some, 16), TILE), [4]);
+        assert!(pixels[4].facts.end == End::Open);
+    }
+}
