@@ -194,7 +194,7 @@ impl<'a> AnyAccel<'a> {
         Self { kind, structure, test: IntersectorKind::Exact }
     }
 
-    /// The same structure asked with another test.
+    /// This structure, asked with another ray/triangle test.
     #[must_use]
     pub fn tested_by(self, test: IntersectorKind) -> Self {
         Self { test, ..self }

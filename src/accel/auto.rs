@@ -204,8 +204,8 @@ fn build_for<'a>(
     (AnyAccel::build(reason.kind, shapes, params), Some(reason))
 }
 
-/// The same over `shapes` and what is `instanced`, for so many eye rays: the larger one of both, shapes or objects, is the
-/// one that is judged.
+/// Builds a structure as [`build`] does over `shapes` and `instanced` objects, for so many primary rays: the larger of both,
+/// shapes or objects, is the one that is judged.
 pub fn build_with<'a>(
     eye_rays: u64,
     choice: AccelChoice,

@@ -53,7 +53,7 @@ impl AccelParams {
         self.grid(AccelKind::GridOctree).validate()
     }
 
-    /// Those of the grid of a kind that has one.
+    /// The parameters of the grid of a kind that has one.
     pub fn grid(&self, kind: AccelKind) -> GridParams {
         let default = match kind {
             AccelKind::Grid => GridParams::UNIFORM,

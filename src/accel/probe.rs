@@ -9,7 +9,7 @@ use std::ops::AddAssign;
 
 /// What a walk tells about itself while it runs.
 ///
-/// What takes work to say is said by a closure, which nobody calls who does not listen.
+/// Costly details come as closures, which only probes that record them call.
 pub trait Probe: Default + Send {
     /// Whether it hears nothing, so that rays may be asked in any way that gives the same answers.
     const SILENT: bool = false;
@@ -21,7 +21,7 @@ pub trait Probe: Default + Send {
     fn query(&mut self) {}
     /// A node or cell was entered (n_ts).
     fn step(&mut self) {}
-    /// The same, told in words: once for each step.
+    /// The node or cell that is visited, once for each step; probes that record nothing never call the closure.
     #[inline(always)]
     fn visit(&mut self, _visit: impl FnOnce() -> Visit) {}
     /// A leaf cell was visited (n_ets), `empty` if nothing is listed in it (n_eets).

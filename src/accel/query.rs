@@ -317,8 +317,7 @@ impl<'a, G: Goal> Query<'a, G> {
         Hit { t, u, v, prim }
     }
 
-    /// The same for a hit with a triangle of a block, which need not be among the shapes; `None` where nothing such is the
-    /// answer.
+    /// The answer, where it is a hit with a triangle of a block, which need not be among the shapes.
     pub(super) fn hit_by_winner(&self) -> Option<Hit> {
         let (t, prim) = self.goal.best()?;
         let Winner { corners, meeting, .. } = self.winner.as_ref().filter(|winner| winner.prim == prim)?;
@@ -474,7 +473,7 @@ impl<'w, I> Closest<'w, I> {
 }
 
 impl<'w, I> Occluded<'w, I> {
-    /// Nothing yet, of the ray of this number.
+    /// The goal of the ray of this number in its batch, of which nothing is found yet.
     #[inline(always)]
     pub(super) fn by(filter: Option<&'w dyn OccludedFilter>, ray: usize, test: I) -> Self {
         Self { found: false, filter, ray, test }
@@ -527,7 +526,7 @@ pub struct Tested<'a, I, C> {
 }
 
 impl<'a, I: Intersector, C: Culling> Tested<'a, I, C> {
-    /// The same structure with another test.
+    /// `structure` with another test.
     pub fn new(structure: &'a C, test: I) -> Self {
         Self { structure, test }
     }

@@ -37,7 +37,7 @@ impl Pencil<'_> {
         Ray::new(self.origin, Vec3::new(x[i], y[i], z[i]))
     }
 
-    /// These of its rays, or as many of them as there are.
+    /// A part of its rays, as far as there are so many.
     #[must_use]
     pub fn part(&self, rays: Range<usize>) -> Self {
         Self { dirs: self.dirs.map(|row| row.get(rays.clone()).unwrap_or(&[])), ..*self }

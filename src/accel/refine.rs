@@ -67,7 +67,7 @@ impl Prim<'_> {
         self.refine_with_care(ray, hit)
     }
 
-    /// The same for every prim, ray and place of a hit.
+    /// Refines a hit of any prim and ray, wherever it lies.
     fn refine_with_care(&self, ray: &Ray, hit: &Hit) -> Refined {
         let Some(space) = RaySpace::new(ray.origin, ray.dir) else {
             let position = ray.origin;

@@ -128,7 +128,7 @@ pub(super) struct Look {
     pub env_rays: Option<u32>,
     /// Rays that rough surfaces spread.
     pub gloss_rays: Option<u32>,
-    /// Shadow rays to each wide light.
+    /// Shadow rays to each area light.
     pub light_rays: Option<u32>,
     /// How wide directional lights look, degrees.
     pub sun_size: Option<f64>,

@@ -11,7 +11,7 @@ use crate::scene::{Material, Reflection};
 pub(crate) struct Absorption(Vec<Vec3>);
 
 impl Absorption {
-    /// Those of all materials; with `no_prune` also where all are zero.
+    /// The coefficients of all materials; with `no_prune` also where all are zero.
     pub(crate) fn of(materials: &[Material], no_prune: bool) -> Self {
         let coefficient = |material: &Material| match &material.reflection {
             Reflection::MetalRough(m) if m.thick && m.transmission > 0.0 => m.absorption,
@@ -26,12 +26,12 @@ impl Absorption {
         !self.0.is_empty()
     }
 
-    /// That of the inside of a material.
+    /// The coefficient of the inside of a material.
     pub(crate) fn by(&self, material: u32) -> Option<Vec3> {
         self.0.get(material as usize).copied()
     }
 
-    /// That of what a ray is inside of; `None` in empty space.
+    /// The coefficient of the medium that a ray is in; `None` in empty space.
     pub(crate) fn within(&self, media: &Media) -> Option<Vec3> {
         self.by(media.innermost()?.material)
     }

@@ -7,7 +7,7 @@ use super::whitted::{Sample, Tracer};
 use crate::accel::Accel;
 use std::ops::Range;
 
-/// The same number of samples of each pixel.
+/// First samples of pixels, equally many of each.
 #[derive(Debug)]
 pub(super) struct Ahead {
     columns: usize,
@@ -49,7 +49,7 @@ impl Ahead {
         }
     }
 
-    /// Those of one pixel with these numbers, no more than there are.
+    /// The samples of one pixel with these numbers, no more than there are.
     pub(super) fn of(&self, pixel: (u32, u32), numbers: Range<u32>) -> OfPixel<'_> {
         let start = self.place(pixel);
         let range = start + numbers.start as usize..start + numbers.end.min(self.samples) as usize;

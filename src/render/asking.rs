@@ -54,7 +54,7 @@ impl<'a, A: Accel> Asking<'a, A> {
         self.occluded_filtered(rays, None, blocked, probe);
     }
 
-    /// The same, and whether anything else is hit where it stops light.
+    /// Whether anything opaque is hit by each ray, or anything else where it stops light.
     pub(crate) fn stopped<P: Observer>(&mut self, through: &Through, blocked: &mut [bool], probe: &mut P) {
         self.occluded_filtered(through.rays, Some(through), blocked, probe);
     }

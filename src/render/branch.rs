@@ -24,7 +24,7 @@ pub(super) trait ShadingPoint {
     /// Whether the front of the face was hit.
     fn is_front(&self) -> bool;
 
-    /// How far its normal turns over the ray's cone before maps turn it: the squares of the angles, summed over both axes.
+    /// How much the normal, before maps turn it, varies across the ray's cone: the squares of the angles, summed over both axes.
     fn bend(&self, context: &Context) -> f32;
 
     /// A ray from here along `dir`, of unit length, without end.
@@ -152,7 +152,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// The balance of light that has all its wavelengths, of which each has its own.
+    /// The bounce weights of light that has all its wavelengths, of which each has its own.
     fn split_bounce_weights<G: ShadingPoint>(&self, point: &PathVertex<G>, cosine: f32) -> BounceWeights {
         let mut all = BounceWeights::default();
         for (i, band) in (0u8..).zip(&self.context.bands) {
@@ -344,7 +344,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let ShadingFrame { normal, geometric, view, .. } = point.surface.seen();
         let (n_i, n_t) = (f64::from(crossing.n_i), f64::from(crossing.n_t));
         let Some(bent) = refract(-view, normal, n_i, n_t) else {
-            // Total reflection by a hair that the balance did not see.
+            // Total reflection by a hair that the bounce weights did not see.
             return self.send_reflected(point, normal, weight, band);
         };
         let dir = above(bent, -geometric);

@@ -16,7 +16,7 @@ pub struct ByClass<T> {
 }
 
 impl<T> ByClass<T> {
-    /// All of them, in the order of the fields.
+    /// The values of all classes, in the order of the fields.
     pub(crate) fn each_mut(&mut self) -> [&mut T; 4] {
         [&mut self.primary, &mut self.shadow, &mut self.reflected, &mut self.refracted]
     }

@@ -69,7 +69,7 @@ pub(crate) struct Context<'a> {
     pub shows_environment: bool,
     /// Rays that each point sends to its surroundings.
     pub env_rays: u32,
-    /// Shadow rays to each wide light; at least 1.
+    /// Shadow rays to each area light; at least 1.
     pub light_rays: u32,
     /// Rays that rough surfaces spread.
     pub gloss: Gloss,
@@ -79,7 +79,7 @@ pub(crate) struct Context<'a> {
     pub fireflies: Option<Arc<Fireflies>>,
     /// Samples of all pixels that are traced before the picture, with which they start; 0: none.
     pub first_samples: u32,
-    /// These.
+    /// The first samples of pixels, where they were traced ahead.
     pub ahead: Option<Arc<Ahead>>,
     /// How far highlights are spread, in widths of a ray's cone.
     pub highlight_reach: f32,
@@ -117,12 +117,12 @@ impl Gloss {
         Self { rays: asked.unwrap_or(GLASS), width: 1.0, all: asked.is_some_and(|rays| rays > 0) }
     }
 
-    /// The same where pixels are sampled so: all samples that a pixel may have send rays, and together they cover the lobe.
+    /// Glossy rays where pixels are sampled so: all samples that a pixel may have send rays, and together they cover the lobe.
     fn of_samples(self, settings: &Settings) -> Self {
         Self { width: sample_width(settings), ..self }
     }
 
-    /// The same rays, shared by so many samples.
+    /// The rays of one of so many samples that share them.
     fn shared_by(self, samples: u32) -> Self {
         Self { rays: self.rays.div_ceil(samples), ..self }
     }
@@ -190,7 +190,8 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// What rays of a class with these cones find for certain, where whoever listens does not mind that they pass it.
+    /// The alpha filter of rays of a class with these cones; `None` in counted runs, and where passing gaps could change
+    /// the order of sums.
     ///
     /// What a sample gathers is added in the order of its rays, which must not depend on where these pass gaps, and so on how
     /// many wait: so they do where each of so many samples has one ray alone, or no more wait in the end than go together.
@@ -211,7 +212,7 @@ impl<'a> Context<'a> {
         self.has_filters && !self.no_prune
     }
 
-    /// The same with other random choices, and other samples.
+    /// This context with other random choices, and other samples.
     pub(super) fn resampled(&self, settings: &Settings) -> Self {
         let (highlight_reach, gloss) = (glint::reach(settings), self.gloss.of_samples(settings));
         Self { seed: settings.seed, highlight_reach, gloss, ahead: None, ..self.clone() }
@@ -228,7 +229,7 @@ impl<'a> Context<'a> {
         (self.world.prim(prim), self.world.material(self.scene, prim))
     }
 
-    /// Shadow rays to each wide light after so many bounces: what mirrors show needs no more than a hint of soft edges.
+    /// Shadow rays to each area light after so many bounces: what mirrors show needs no more than a hint of soft edges.
     pub(crate) fn light_rays_at(&self, depth: u32) -> u32 {
         if depth == 0 { self.light_rays } else { self.light_rays.div_ceil(4) }
     }

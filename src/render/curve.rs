@@ -69,11 +69,11 @@ impl Surface<'_> {
         if cosine <= 0.0 {
             return None;
         }
-        Some(ShadowRays { ray: self.straight_feeler(incident, sample), riser: None })
+        Some(ShadowRays { ray: self.shadow_ray(incident, sample), riser: None })
     }
 
     /// The ray from the triangle itself to a light on either side of it.
-    pub(crate) fn straight_feeler(&self, incident: &Incident, sample: u32) -> Ray {
+    pub(crate) fn shadow_ray(&self, incident: &Incident, sample: u32) -> Ray {
         let (dir, end) = incident.way(self.origin(incident.to_light));
         self.ray(dir, end, sample)
     }

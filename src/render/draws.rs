@@ -49,9 +49,9 @@ pub(crate) enum Purpose {
 }
 
 impl Draws {
-    /// Those of a hit. Where the sample has no place in a stream, nothing but the ray and where it ended decides them: equal
-    /// rays have equal numbers. Else they are the sample's members of sequences that all samples of its pixel share, so that
-    /// these together fill what they sample evenly; `branch` tells the hits of one sample's tree apart.
+    /// The numbers of a hit. Where the sample has no place in a stream, nothing but the ray and where it ended decides
+    /// them: equal rays have equal numbers. Else they are the sample's members of sequences that all samples of its pixel
+    /// share, so that these together fill what they sample evenly; `branch` tells the hits of one sample's tree apart.
     pub(crate) fn at(seed: u64, streams: &[Stream], branch: u32, ray: &Ray, hit: &Hit, purpose: Purpose) -> Self {
         if let Some(&stream) = streams.get(ray.sample as usize) {
             return Self::of(stream, branch, purpose);
@@ -62,7 +62,7 @@ impl Draws {
         Self(From::Hit(Random::new(mixed)))
     }
 
-    /// Those of a sample's place in its stream.
+    /// The numbers of a sample's place in its stream.
     pub(crate) fn of(stream: Stream, branch: u32, purpose: Purpose) -> Self {
         Self(From::Stream(stream, mix(branch, purpose as u32)))
     }

@@ -36,7 +36,7 @@ pub(super) fn least_square(surface: &Surface, map: (Option<&TextureRef>, f32), c
     least_of(surface.turning(context, reach, map), spread, reach)
 }
 
-/// The same where normals turn so far within reach: the squares of the angles, summed over both axes.
+/// Least α² of a highlight where normals turn so far within reach: the squares of the angles, summed over both axes.
 #[inline(always)]
 pub(super) fn least_of(turning: f32, spread: f32, reach: f32) -> f32 {
     // The direction to the eye turns over the cone, and the halfway direction half as far, along both axes.

@@ -117,14 +117,14 @@ pub struct Settings {
     /// Rays that the first rough surface on a line of sight spreads over what it mirrors, and over what it lets through; 0: rough
     /// surfaces see their surroundings blurred by a formula, and nothing else. `None`: 4 for what lets light through, else 0.
     pub gloss_rays: Option<u32>,
-    /// How many times as bright as they are the walls of the built-in studio are behind everything.
+    /// Brightness factor of the built-in studio's walls as the background of the picture; what they light stays as it is.
     pub walls: f32,
     /// Whether [`crate::image::Layers`] are wanted.
     pub layers: bool,
-    /// For measurements: whether each point of a surface is shaded by itself and none beside others; the same picture, later.
+    /// For measurements: shade points one by one, not in batches. The same bits, more slowly.
     pub one_by_one: bool,
-    /// For measurements: whether what the scene does without is done all the same, for nothing (see [`no_prune`]). The
-    /// world and the textures of the [`Job`] must be such, too.
+    /// For measurements: run the code paths that the scene does not need, too, without effect (see [`no_prune`]). The world and
+    /// the textures of the [`Job`] must be such, too.
     pub no_prune: bool,
 }
 
@@ -162,7 +162,7 @@ impl Settings {
         u64::from(self.width) * u64::from(self.height) * u64::from(samples)
     }
 
-    /// The same with as many samples in each pixel.
+    /// These settings with equally many samples in each pixel.
     fn fixed(&self) -> Self {
         Self { sampling: Sampling::Uniform, ..self.clone() }
     }
@@ -208,7 +208,7 @@ pub type ClassCounts = ByClass<RayCounts>;
 pub struct Job<'a> {
     /// The scene as loaded.
     pub scene: &'a Scene,
-    /// The same scene placed for tracing.
+    /// The scene, placed for tracing.
     pub world: &'a World,
     /// The structure built over the world ([`World::structure`]).
     pub accel: &'a AnyAccel<'a>,

@@ -7,7 +7,7 @@
 //! - at each point: the lookup of every map that its material lacks, in a map of the program's own
 //!   ([`TextureStore::without_pruning`](super::texture::TextureStore::with_everything)), with normal and bump mapping;
 //! - at each point: what is absorbed on the way to it, by materials that absorb nothing;
-//! - at each point where rays end: the balance of what is reflected and refracted, and its spectrum.
+//! - at each point where rays end: the weights of what is reflected and refracted, and its spectrum.
 //!
 //! Points are shaded one by one, since what is shaded side by side has no such code.
 //!

@@ -171,7 +171,7 @@ pub(super) struct Measure {
 }
 
 impl Measure {
-    /// Those of a scene; of stochastic sampling its own, else those of the displayed picture.
+    /// The numbers of a scene; of stochastic sampling its own, else those of the displayed picture.
     pub(super) fn of(job: &Job) -> Self {
         let space = match job.settings.sampling {
             Sampling::Stochastic(how) => how.space,

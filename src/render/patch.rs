@@ -99,7 +99,7 @@ pub(crate) struct Footprint {
 }
 
 impl Footprint {
-    /// That of a ray without width.
+    /// The footprint of a ray without width.
     pub(crate) const NONE: Self = Self { along: Vec3::ZERO, across: Vec3::ZERO };
 
     /// Cone of diameter `width` along the unit vector `dir` on a surface with unit normal `normal`.

@@ -31,7 +31,7 @@ pub(crate) struct PrimaryRays {
 /// Rays that ask for their first hits.
 pub(crate) struct PrimaryQuery<'e> {
     pub rays: &'e [Ray],
-    /// The same, if they are one.
+    /// The rays as a pencil, if all start at one place.
     pub pencil: Option<Pencil<'e>>,
     /// Widths and growths of the cones around them.
     pub cones: [&'e [f32]; 2],
@@ -215,7 +215,7 @@ impl PrimaryRays {
         (self.count, self.is_pencil) = (0, true);
     }
 
-    /// All of them.
+    /// All rays.
     pub(crate) fn rays(&self) -> &[Ray] {
         &self.rays[..self.count]
     }
@@ -367,7 +367,7 @@ struct Aim<'a> {
     rays: &'a mut [Ray; RUN],
     /// Where their directions and cones go, by axis, width and growth.
     columns: [&'a mut [f32; RUN]; 5],
-    /// That of the first ray.
+    /// The sample of the first ray.
     sample: u32,
 }
 

@@ -67,7 +67,7 @@ impl Default for Adaptive {
 /// Rays at random places, added in rounds until the mean of a pixel is certain.
 ///
 /// R. L. Cook, T. Porter, L. Carpenter, "Distributed Ray Tracing" (1984); M. A. Z. Dippé, E. H. Wold, "Antialiasing Through
-/// Stochastic Sampling" (1985). With the same numbers wide lights, rough surfaces and lenses are sampled.
+/// Stochastic Sampling" (1985). With the same numbers area lights, rough surfaces and lenses are sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stochastic {
     /// What a pixel may be wrong by, the root of the mean squared error of its channels, each 0…1 after development.

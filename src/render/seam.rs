@@ -31,8 +31,8 @@ pub(crate) fn is_same_crossing<'a>(face: impl Fn(u32) -> (Prim<'a>, u32), ray: &
     meet && a.faces(ray) == b.faces(ray)
 }
 
-/// The same of a ray that starts before the surface of `before`, which it crosses, and meets something no farther than the error
-/// of its start: all that is of the same material there and turns the same side to it is the same surface, however small
+/// Whether a ray that starts before the surface of `before`, which it crosses, meets it once more, no farther than the error of
+/// its start: all that is of the same material there and turns the same side to it is the same surface, however small
 /// its faces are, and however many lie in one place.
 pub(crate) fn is_same_surface<'a>(face: impl Fn(u32) -> (Prim<'a>, u32), ray: &Ray, before: &Hit, hit: &Hit) -> bool {
     if !before.is_some() {

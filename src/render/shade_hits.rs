@@ -12,11 +12,11 @@ use super::observer::Observer;
 use super::primary_rays::PrimaryRays;
 use super::seam::{is_same_crossing, is_same_surface};
 use super::shade::{Bsdf, LocalLight};
-use super::shading_batch::{BatchPoint, HitsByInstance, MaterialConstants, POINTS, Passed, ShadingBatch};
+use super::shading_batch::{BatchPoint, HitsByInstance, MaterialConstants, POINTS, Passed, PlacedMesh, ShadingBatch};
 use super::sobol::mix;
 use super::surface::{HitPrim, Surface};
 use super::wave::{Path, RayClass, Wave};
-use super::whitted::Tracer;
+use super::whitted::{Arrival, Tracer};
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
 use crate::math::simd::LANES;
@@ -97,7 +97,7 @@ pub(super) struct ShadingBuffers {
     /// Rays that met nothing and see the surroundings.
     missed: Vec<u32>,
     ranks: Ranks,
-    /// Points of a strip with their numbers for wide lights, and how many places they draw.
+    /// Points of a batch with their numbers for area lights, and how many places they draw.
     draws: Vec<(usize, Draws, u32)>,
 }
 
@@ -163,7 +163,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// The same of hits that follow each other.
+    /// Adds what some eye rays see whose hits follow each other.
     fn shade_some_eyes(&mut self, eyes: &PrimaryRays, (first, hits): (u32, &[Hit])) {
         let context = self.context;
         let mut sorted = self.sort();
@@ -202,7 +202,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         self.beside.ranks = ranks;
     }
 
-    /// The same of these of its rays, which belong to different samples.
+    /// Adds what these rays of a wave see, which belong to different samples.
     fn shade_some(&mut self, (class, wave): (RayClass, &Wave), rays: &[u32]) {
         let context = self.context;
         let traced = TracedRays::Wave(class, wave);
@@ -243,7 +243,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     /// Shades what the `i`th ray has hit.
     fn shade_one(&mut self, traced: TracedRays, i: usize) {
         let (ray, hit) = (&traced.rays()[i], &traced.hits()[i]);
-        self.shade(traced.class(), (ray, hit, traced.touches(i)), &traced.path_through(i));
+        let arrival = Arrival { ray, hit, touches: traced.touches(i) };
+        self.shade(traced.class(), arrival, &traced.path_through(i));
     }
 
     fn sort(&mut self) -> HitsByInstance {
@@ -309,7 +310,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             batch.widen(traced);
         }
         if reads {
-            batch.read(context, traced, (mesh, placement), common);
+            batch.read(context, traced, PlacedMesh { mesh, placement }, common);
         }
         if !common.is_completed() {
             batch.blur(traced, bsdf);
@@ -328,8 +329,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             return;
         }
         self.note_batch(traced, (instance, bsdf), batch);
-        batch.complete(context, traced, (mesh, placement), common);
-        batch.overlay(context, traced, (mesh, placement), common);
+        batch.complete(context, traced, PlacedMesh { mesh, placement }, common);
+        batch.overlay(context, traced, PlacedMesh { mesh, placement }, common);
         if !common.glass.is_some_and(|glass| glass.is_dark_inside && batch.sees_backs_alone()) {
             self.show(traced, common, batch);
         }
@@ -421,7 +422,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         });
     }
 
-    /// Point `i` with its numbers for wide lights, and how many places it draws of each.
+    /// Point `i` with its numbers for area lights, and how many places it draws of each.
     fn draws_for_lights(&self, traced: TracedRays, batch: &ShadingBatch, i: usize) -> (usize, Draws, u32) {
         let (context, (at, ..)) = (self.context, batch.arrival(i));
         let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
@@ -454,7 +455,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let drawn = place.map(|place| batch.drawn(i, place));
             if let Some(shadow_rays) = shadow_rays(context, (light, drawn), ray, hit) {
                 let media = absorbs.then(|| traced.path(at).media);
-                self.shadows.push_feelers(&shadow_rays, radiance, media);
+                self.shadows.push_pair(&shadow_rays, radiance, media);
             }
         }
     }

@@ -59,8 +59,8 @@ impl ShadowQueue {
         self.push_bound(ray, Bound { radiance: light, tag: ray.sample }, media);
     }
 
-    /// The same of a ray that may start above its surface.
-    pub(crate) fn push_feelers(&mut self, shadow_rays: &ShadowRays, light: Vec3, media: Option<Media>) {
+    /// Queues a shadow ray that may start above its surface.
+    pub(crate) fn push_pair(&mut self, shadow_rays: &ShadowRays, light: Vec3, media: Option<Media>) {
         if let Some(riser) = shadow_rays.riser {
             self.raised.push(self.rays.len());
             self.risers.push(riser);

@@ -63,7 +63,7 @@ pub struct Query {
     pub after: Hit,
     /// In order.
     pub events: Vec<Event>,
-    /// The same as sums.
+    /// The counts of all queries together.
     pub counts: RayCounts,
     /// The hit; of a shadow ray that was blocked only the first `prim` found in its way.
     pub hit: Hit,

@@ -106,7 +106,7 @@ impl<P: Observer> Plan<P> {
         self.how.error = single((f64::from(self.how.error) * gain).clamp(*RANGE.start(), *RANGE.end()));
     }
 
-    /// Those of one of its renderings.
+    /// The settings of one of its renderings.
     pub(super) fn settings(&self, settings: &Settings, number: u64) -> Settings {
         Settings { sampling: Sampling::Stochastic(self.how), seed: seed(settings.seed, number), ..settings.clone() }
     }

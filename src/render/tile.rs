@@ -43,16 +43,16 @@ pub(super) struct Tile {
 pub(super) struct TilePixels {
     pub tile: Tile,
     pub beauty: Vec<[f32; 4]>,
-    /// Where the frame has any.
+    /// Background seen through coloured glass, where the frame has any.
     pub veil: Vec<[f32; 4]>,
     pub layers: Vec<LayerPixel>,
     /// Empty where every pixel has equally many samples.
     pub facts: Vec<PixelFacts>,
-    /// Eye rays in all.
+    /// Primary rays in all.
     pub rays: u64,
-    /// Of them those through pixels around the tile.
+    /// Of these, the ones through pixels around the tile.
     pub rays_around: u64,
-    /// And those first ones around it that neighbours would have traced, had they been rendered, too.
+    /// Of these, first samples of border pixels that are charged to this tile only because it is rendered without its neighbours.
     pub rays_beyond: u64,
 }
 

@@ -28,22 +28,22 @@ impl RayClass {
 pub(crate) struct Path {
     /// Product of the weights from the eye to here.
     pub weight: Vec3,
-    /// The part of what was spread over several rays that this one stands for: whether a branch is worth its rays is judged
-    /// by what all of them carry together.
+    /// 1/N where this is one of N rays that a branch was spread over: whether the branch is worth its rays is judged by what all
+    /// of them carry together.
     pub part: f32,
     /// Bounces since the eye.
     pub depth: u32,
     /// Whether the ray still runs along the line of sight, so that what lies behind shows through.
     pub straight: bool,
-    /// Whether the hotspot of the sky was asked for where it was spread, so that it sees none.
+    /// Whether the hotspot of the sky was sampled where this ray was spread, so that the ray itself must not count it again.
     pub skips_hotspot: bool,
-    /// Of a ray that goes on behind a hit, what it crossed last, where that was no hole; [`Hit::MISS`]: nothing.
+    /// Of a ray that goes on behind a hit, the surface it crossed last, unless that was a hole; [`Hit::MISS`]: none.
     pub crossed: Hit,
     /// The part of the spectrum this ray carries, once dispersion has split it.
     pub band: Option<u8>,
     /// What the ray is inside of.
     pub media: Media,
-    /// Up to this t of the ray its weight has been lessened by what absorbs light there.
+    /// Absorption has been applied to the weight up to this t of the ray.
     pub since: f32,
     /// Width of the cone around the ray at its start: the part of the picture it stands for.
     pub cone_width: f32,
@@ -174,7 +174,7 @@ impl Media {
 pub(crate) struct Queue {
     rays: Vec<Ray>,
     paths: Vec<Path>,
-    /// Of a ray that goes on: the hit behind which it does. Of a ray that starts: the hit it left, with `t` as far as it may
+    /// Of a continuing ray: the last hit; the search resumes behind it. Of a new ray: the hit it left, with `t` as far as it may
     /// meet the same surface again; [`Hit::MISS`] if it may not.
     after: Vec<Hit>,
     /// So many at the front are in the order of their samples.

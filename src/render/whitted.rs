@@ -75,6 +75,14 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     pub counts: ByClass<P>,
 }
 
+/// A ray and what it has hit.
+pub(super) struct Arrival<'a> {
+    pub ray: &'a Ray,
+    pub hit: &'a Hit,
+    /// Whether the hit lies where the ray has crossed another surface just before.
+    pub touches: bool,
+}
+
 impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     pub(crate) fn new(context: &'a Context<'a>, accel: &'a A, progress: &'a dyn Progress) -> Self {
         Self {
@@ -237,9 +245,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         sample.radiance += path.weight * seen;
     }
 
-    /// Adds what the surface at `hit` shows by itself, and queues the rays that find the rest; it may touch one that the ray has
-    /// crossed just before.
-    pub(super) fn shade(&mut self, class: RayClass, (ray, hit, touches): (&Ray, &Hit, bool), path: &Path) {
+    /// Adds what the surface at a hit shows by itself, and queues the rays that find the rest.
+    pub(super) fn shade(&mut self, class: RayClass, Arrival { ray, hit, touches }: Arrival, path: &Path) {
         let context = self.context;
         let lessened = context.absorption.is_some().then(|| context.absorption.lessened(ray, path, hit));
         let (before, path) = (path, lessened.as_ref().unwrap_or(path));
@@ -350,7 +357,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// Direct light, of wide lights from several of their points.
+    /// Direct light, of area lights from several of their points.
     fn light(&mut self, point: &PathVertex<Surface>, crossing: &Crossing) {
         let (context, position) = (self.context, point.surface.position);
         let mut draws = None;
@@ -401,10 +408,10 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
         let inside = self.context.absorption.is_some().then_some(point.path.media);
         if !above {
-            return self.shadows.push(surface.straight_feeler(incident, sample), radiance, inside);
+            return self.shadows.push(surface.shadow_ray(incident, sample), radiance, inside);
         }
         if let Some(shadow_rays) = surface.shadow_rays(incident, sample) {
-            self.shadows.push_feelers(&shadow_rays, radiance, inside);
+            self.shadows.push_pair(&shadow_rays, radiance, inside);
         }
     }
 }

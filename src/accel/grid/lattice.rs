@@ -55,7 +55,7 @@ impl CellMargins {
         guarded: true,
     };
 
-    /// The same for rays that start nearer: cells and grid are hardly larger than their content.
+    /// Margins for rays that start nearer: cells and grid are hardly larger than their content.
     pub const NEAR: Self =
         Self { pad: NEAR_CELL_PAD, room: NEAR_GRID_ROOM, ray_cells: NEAR_RAY_CELLS, ..Self::DERIVED };
 }

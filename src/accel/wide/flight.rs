@@ -261,7 +261,7 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
         }
     }
 
-    /// The same; `FAR`: what is visited next is fetched.
+    /// Steps each ray; with `FAR` the nodes that come next are prefetched.
     #[inline(always)]
     fn step_each<S: Simd, const FAR: bool>(&self, s: S, slots: &mut Slots, mut nodes: u32) {
         let tree_nodes = self.tree.nodes;

@@ -157,7 +157,7 @@ impl<'a> Wide<'a> {
         if B::EVERY_LEVEL { self.level.run(kernel) } else { self.level.run_vectors(kernel) }
     }
 
-    /// The same for one that has no use for more than eight lanes.
+    /// Runs a kernel that has no use for more than eight lanes.
     #[inline]
     fn run_narrow<B: BoxMargins, K: Kernel>(&self, kernel: K) -> K::Output {
         if B::EVERY_LEVEL { self.level.run_narrow(kernel) } else { self.level.run_vectors(kernel) }
@@ -194,7 +194,8 @@ impl Culling for Wide<'_> {
     }
 }
 
-/// Whether rays may be asked in any way that gives the same answers: nobody counts, and the test is exact.
+/// Whether packets and rays in flight are allowed, as any way that gives the same answers: nothing is counted, and the test is
+/// exact.
 struct Together<W, P>(PhantomData<(W, P)>);
 
 impl<W: QueryBatch, P: Probe> Together<W, P> {

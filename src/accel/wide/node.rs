@@ -111,7 +111,7 @@ impl Child {
         }
     }
 
-    /// The same child after so many nodes were put before those of its tree.
+    /// A packed child after so many nodes were put before those of its tree.
     fn behind(word: u32, nodes: u32) -> u32 {
         match Self::unpack(word) {
             Self::Node(i) => Self::Node(i + nodes).pack(),

@@ -43,7 +43,7 @@ const AHEAD: usize = 128;
 /// Rays of sixteen that run alike from which on they are a packet, without the others.
 const ENOUGH: u32 = 8;
 
-/// The same of thirty-two: what runs otherwise may be a packet of its own.
+/// Likewise of packets of thirty-two: what runs otherwise may be a packet of its own.
 const ENOUGH_BROAD: u32 = 24;
 
 /// So many narrow packets come after a broad one whose rays are not close, and twice as many after the next such one.

@@ -85,7 +85,7 @@ impl PreparedRays {
     }
 }
 
-/// The same word in all lanes, by its bits.
+/// One word in all lanes, by its bits.
 #[inline(always)]
 fn word<S: Simd>(s: S, word: u32) -> S::Lanes {
     s.splat(f32::from_bits(word))
@@ -179,7 +179,7 @@ mod tests {
         level.run(Take(tree, &ClosestBatch { rays, pencil: None, filter: None, hits: &mut [], test: Exact }, start))
     }
 
-    /// The same by plain numbers, one ray after another.
+    /// Prepares a ray by plain numbers: what lanes are compared with.
     fn plainly(tree: &Tree, ray: &Ray) -> (PreparedRay, f32) {
         let (space, _) = RaySpace::checked(ray.origin, ray.dir);
         let parallel = ray.dir.abs().max_element() * PARALLEL;
@@ -209,7 +209,7 @@ mod tests {
         (ready, ray.t_min)
     }
 
-    /// The same of a ray that was taken.
+    /// A prepared ray of a lane, with its reach.
     fn of(ready: &PreparedRays, lane: usize) -> (PreparedRay, f32) {
         (ready.rays[lane], ready.t_min[lane])
     }

@@ -114,7 +114,7 @@ fn descend<B: BoxMargins, S: Simd, W: QueryBatch>(
     }
 }
 
-/// The same for a ray that any hit answers: how far it looks never changes, so that children need no distances, and to put
+/// Descends with a ray that any hit answers: how far it looks never changes, so that children need no distances, and to put
 /// them in order takes longer than it saves.
 #[inline(always)]
 fn descend_any<B: BoxMargins, S: Simd, W: QueryBatch>(

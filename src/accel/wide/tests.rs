@@ -38,7 +38,7 @@ fn bundles(rays: &[Ray]) -> Vec<Ray> {
     side_by_side(rays, 16)
 }
 
-/// The same with so many rays in each bundle.
+/// Rays in bundles of so many.
 fn side_by_side(rays: &[Ray], count: usize) -> Vec<Ray> {
     let bundle = |(i, ray): (usize, &Ray)| {
         let (ray, width) = (*ray, ray.dir.length() * 0.03);

@@ -86,7 +86,7 @@ impl Face {
         (is_known && face.at.is_finite() && face.normal.is_finite()).then_some(face)
     }
 
-    /// The same with what cuts it out.
+    /// This face with the map that cuts it out.
     pub(super) fn cut_by(self, map: u32, [one_sided, sharp]: [bool; 2]) -> Self {
         Self { map, flags: (u32::from(one_sided) * ONE_SIDED) | (u32::from(sharp) * SHARP), ..self }
     }

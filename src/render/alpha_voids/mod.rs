@@ -45,7 +45,7 @@ pub(crate) struct AlphaVoids<'a> {
     textures: &'a TextureStore<'a>,
     /// By mesh.
     sheets: Vec<Option<MaskedMesh<'a>>>,
-    /// The prims that are faces of sheets and stored, in order, and how many come before each of these runs.
+    /// The prims that are faces of masked meshes and stored, in order, and how many come before each of these runs.
     runs: Vec<(Range<u32>, usize)>,
     count: usize,
     maps: Late<Maps>,
@@ -195,7 +195,7 @@ impl<'a> AlphaVoids<'a> {
         Some((face, survey))
     }
 
-    /// The face of a prim, if it is one of a sheet.
+    /// The face of a prim, if it is one of a masked mesh.
     #[inline(never)]
     fn make(&self, maps: &Maps, prim: u32) -> Option<Face> {
         let PrimSource::Triangle { instance, triangle } = self.world.source(prim) else { return None };
@@ -302,7 +302,7 @@ pub(super) enum Cones<'r> {
     PrimaryRays([&'r [f32]; 2]),
     /// What rays carry that start, and what each comes from.
     Starting(&'r [Path], &'r [Hit]),
-    /// Or that go on.
+    /// Of rays of a wave, which go on.
     Continuing(&'r [Path]),
 }
 

@@ -48,7 +48,7 @@ impl Shown {
         [r, g, b, alpha, &self.brightest]
     }
 
-    /// The same, to be changed.
+    /// The columns, to be changed.
     pub(in crate::render) fn columns_mut(&mut self) -> [&mut [f32]; 5] {
         let [r, g, b, alpha] = &mut self.colors;
         [r, g, b, alpha, &mut self.brightest]
@@ -74,7 +74,7 @@ impl Even {
         self.is_uneven[i] == 0
     }
 
-    /// The same of all at these places.
+    /// Whether all pixels at these places are even.
     pub(in crate::render) fn are_even(&self, places: Run<usize>) -> bool {
         self.is_uneven[places].iter().fold(0, |any, uneven| any | uneven) == 0
     }

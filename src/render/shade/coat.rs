@@ -75,7 +75,7 @@ impl CoatLobe {
         self.shown(view, to_light, squared_width(self.roughness).max(self.least_square))
     }
 
-    /// The same for facets with a squared width of α².
+    /// BRDF × N·L of a light, for facets with a squared width of α².
     #[inline(always)]
     fn shown(&self, view: Vec3, to_light: Vec3, a2: f32) -> f32 {
         let (n_l, n_v) = (self.normal.dot(to_light), self.normal.dot(view));

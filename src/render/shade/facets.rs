@@ -213,7 +213,7 @@ fn row(roughness: f32) -> (u32, f32) {
     before(roughness.clamp(0.0, 1.0) * 8.0)
 }
 
-/// The same column of this N·V.
+/// The column of [`ALBEDO`] before this N·V, but for the last, and how far behind it that is.
 #[inline(always)]
 fn column(n_v: f32) -> (u32, f32) {
     before(n_v.clamp(0.0, 1.0).sqrt() * 8.0)

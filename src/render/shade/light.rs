@@ -127,7 +127,7 @@ impl LocalLight {
         arrives.then_some(incident)
     }
 
-    /// The same, and whether anything arrives.
+    /// The light that arrives, and whether any does.
     #[inline(always)]
     fn arriving_from(&self, position: Vec3, at: [f32; 2]) -> (Incident, bool) {
         let (to_light, share, end) = match self.shape {
@@ -165,7 +165,7 @@ impl LocalLight {
         arrives.then_some(incident)
     }
 
-    /// What arrives at the first so many positions, of a wide light from the place that is drawn for each with `at`, and whether
+    /// What arrives at the first so many positions, of an area light from the place that is drawn for each with `at`, and whether
     /// anything does.
     #[inline(always)]
     pub(crate) fn arriving_at(

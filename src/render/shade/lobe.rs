@@ -24,7 +24,7 @@ impl Lobe {
         Self { along, across, normal, alpha }
     }
 
-    /// The same width all around.
+    /// A lobe that is equally wide all around its normal.
     pub(crate) fn even(normal: Vec3, alpha: f32) -> Self {
         let (along, across) = normal.any_orthonormal_pair();
         Self::new([along, across], normal, [alpha; 2])
@@ -36,7 +36,7 @@ impl Lobe {
         self.facet_turned(view, at[0], [cos, sin])
     }
 
-    /// The same with cosine and sine of the turn that the second number stands for.
+    /// [`Self::facet`] with cosine and sine of the turn that the second number stands for.
     #[inline(always)]
     pub(crate) fn facet_turned(&self, view: Vec3, at: f32, [cos, sin]: [f32; 2]) -> Vec3 {
         let [wide, narrow] = self.alpha;
@@ -59,7 +59,7 @@ impl Lobe {
         if whole > 0.0 { n_l * (n_v + wide_v) / whole } else { 0.0 }
     }
 
-    /// The same, and 0 for light from below the surface.
+    /// [`Self::kept`], and 0 for light from below the surface.
     #[inline(always)]
     pub(crate) fn sent(&self, view: Vec3, to: Vec3) -> f32 {
         if self.normal.dot(to) > 0.0 { self.kept(view, to) } else { 0.0 }
@@ -94,7 +94,7 @@ impl Lobe {
         Level::best().run(Albedo { lobe: self, view }) / DRAWN as f32
     }
 
-    /// The same seen at this cosine to the normal, where each facet mirrors a share by the cosine between it and the view; of a
+    /// The albedo seen at this cosine to the normal, where each facet mirrors a share by the cosine between it and the view; of a
     /// lobe that has no grain.
     pub(super) fn mirrored(&self, cosine: f32, share: impl Fn(f32) -> f32) -> f32 {
         let cosine = cosine.clamp(0.0, 1.0);

@@ -207,7 +207,7 @@ impl Bsdf {
         if bsdf.outside && m.has_lobes() { bsdf.with_lobes(m, &surface.lobe_frame(), &reader) } else { bsdf }
     }
 
-    /// The same where it scatters light to its other side, if the material does.
+    /// This surface, scattering light to its other side if the material does.
     pub(crate) fn thinned(mut self, m: &MetalRough, reader: &Reader) -> Self {
         if let (Some(diffuse_transmission), Model::MetalRough(core)) = (&m.diffuse_transmission, &mut self.model) {
             core.thin(diffuse_transmission, reader);
@@ -215,7 +215,7 @@ impl Bsdf {
         self
     }
 
-    /// The same with grain, film, sheen and clear coat.
+    /// This surface with anisotropy, film, sheen and clear coat.
     #[cold]
     pub(crate) fn with_lobes(mut self, m: &MetalRough, on: &LobeFrame, reader: &Reader) -> Self {
         let Model::MetalRough(core) = &mut self.model else { return self };
@@ -229,14 +229,14 @@ impl Bsdf {
         self.under(overlays(m, on, occlusion, reader))
     }
 
-    /// The same under these.
+    /// This surface under sheen and clear coat.
     pub(crate) fn under(mut self, (sheen, coat): (Option<SheenLobe>, Option<CoatLobe>)) -> Self {
         (self.sheen, self.coat) = (sheen, coat);
         self.emission *= self.below_coat();
         self
     }
 
-    /// The same as maps of its reflectance say at this point.
+    /// This surface with the reflectance that maps say at this point.
     pub(crate) fn tinted(mut self, m: &MetalRough, reader: &Reader) -> Self {
         if let Model::MetalRough(core) = &mut self.model {
             core.tint(m, reader);
@@ -396,7 +396,7 @@ impl Bsdf {
         self.lit_over(below, (horizon, normal, view), light.to_light, light.irradiance())
     }
 
-    /// The same of a metallic-rough surface on which so much light falls from there.
+    /// What is seen of a metallic-rough surface on whose viewer's side so much light falls from there.
     pub(crate) fn lit_with_lobes(&self, horizon: Vec3, normal: Vec3, view: Vec3, to_light: Vec3, light: Vec3) -> Vec3 {
         let Model::MetalRough(m) = &self.model else { return Vec3::ZERO };
         let below = self.lit_below(m, normal, view, to_light) * light;
@@ -440,7 +440,7 @@ impl Bsdf {
         }
     }
 
-    /// The same of a metallic-rough surface on which so much light falls from there.
+    /// What is seen of so much light that falls on the other side of a metallic-rough surface from there.
     pub(crate) fn lit_through_lobes(&self, normal: Vec3, view: Vec3, to_light: Vec3, light: Vec3) -> Vec3 {
         match &self.model {
             Model::MetalRough(m) if m.is_translucent() => m.lit_through(normal, view, to_light) * light * self.clear(),

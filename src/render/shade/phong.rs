@@ -23,7 +23,7 @@ pub(crate) struct PhongBsdf {
     pub dispersion: f32,
 }
 
-/// Those of them that maps change.
+/// The parameters that maps change.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PhongInputs {
     pub ambient: Vec3,
@@ -73,7 +73,7 @@ impl PhongBsdf {
         PhongInputs { ambient, diffuse, specular, mirror, shininess }
     }
 
-    /// The same with other numbers of a map.
+    /// This material with other numbers from maps.
     #[inline(always)]
     pub(crate) fn painted(&self, inputs: PhongInputs) -> Self {
         let PhongInputs { ambient, diffuse, specular, mirror, shininess } = inputs;

@@ -1,4 +1,4 @@
-//! Lights with an extent at the points of a strip: of each light every point draws as many of its places as its ray is worth,
+//! Lights with an extent at the points of a batch: of each light every point draws as many of its places as its ray is worth,
 //! and all points look at their first ones together, then at their second ones.
 
 use super::columns::{Column, Columns, POINTS, ShadingBatch};

@@ -21,7 +21,7 @@ use crate::render::texture::Places;
 use crate::render::world::Placement;
 use std::ops::{Add, Mul};
 
-/// Points of a strip at most.
+/// Points of a batch at most.
 pub(crate) const POINTS: usize = 64;
 
 pub(super) use crate::math::simd::LANES;
@@ -65,16 +65,16 @@ pub(crate) struct ShadingBatch {
     pub(super) given: Given,
     pub(super) found: Found,
     pub(super) painted: Painted,
-    /// Where a sheet reads them.
+    /// Texels of maps of lobes, where they are read side by side.
     pub(super) of_lobes: Box<LobeTexels>,
     pub(super) cones: Cones,
     pub(super) places: Places,
     pub(super) surroundings: Surroundings,
     pub(super) lit: Lit,
     pub(super) drawn: Drawn,
-    /// The whole matter of each point, where more changes it than columns know; else empty.
+    /// The whole BSDF of each point, where more changes it than columns know; else empty.
     pub(super) whole: Vec<Bsdf>,
-    /// What lies over each point, where that is all there is more; kept from one strip to the next.
+    /// What lies over each point, where that is all there is more; kept from one batch to the next.
     pub(super) overlays: Option<Box<Overlays>>,
 }
 
@@ -83,7 +83,7 @@ pub(crate) struct ShadingBatch {
 pub(super) struct Given {
     origin: Columns,
     dir: Columns,
-    /// Those of the second and third corner.
+    /// The weights of the second and third corner.
     weights: [Column; 2],
     pub faces: Faces,
 }

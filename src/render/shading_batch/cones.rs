@@ -1,4 +1,4 @@
-//! What a ray's cone covers at each point of a strip, and how far the surface bends in it: how wide narrow highlights must
+//! What a ray's cone covers at each point of a batch, and how far the surface bends in it: how wide narrow highlights must
 //! be, and what the surface mirrors.
 
 use super::columns::{Column, Columns, Found, Given, POINTS, ShadingBatch, get, leave, padded, put};

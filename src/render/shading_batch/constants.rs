@@ -36,7 +36,7 @@ pub(crate) struct MaterialConstants {
 pub(crate) struct Lobes {
     /// Whether the mesh around a point must be known, …
     pub reads_mesh: bool,
-    /// … or must if its sheet does not say what maps of lobes do.
+    /// … or must if maps of lobes cannot be read side by side.
     pub reads_maps: bool,
     /// Whether maps say how much it reflects.
     pub reads_reflectance: bool,

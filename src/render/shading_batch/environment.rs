@@ -1,4 +1,4 @@
-//! What the points of a strip show of their surroundings, and what they shine with themselves.
+//! What the points of a batch show of their surroundings, and what they shine with themselves.
 
 use super::columns::{Column, Columns, Found, POINTS, ShadingBatch, get, padded, put};
 use super::overlays::Overlays;
@@ -11,6 +11,13 @@ use crate::render::shade::{
 use crate::render::sky::Sky;
 use crate::render::studio;
 use crate::scene::UpAxis;
+
+/// Light from everywhere: of the sky, and without direction.
+#[derive(Clone, Copy)]
+pub(super) struct EnvironmentLight<'a> {
+    pub sky: &'a Sky,
+    pub ambient: Vec3,
+}
 
 /// The surroundings as each point sees them.
 pub(super) struct Surroundings {
@@ -103,6 +110,7 @@ impl Kernel for Look<'_> {
     fn run<S: Simd>(self, s: S) {
         let Self { found, painted, overlays, to, points, bsdf, has_inside, sky, ambient } = self;
         let (points, emission) = (points.min(POINTS), bsdf.emission);
+        let around = EnvironmentLight { sky, ambient };
         match &bsdf.model {
             Model::Unlit(_) if painted.any => {
                 (0..points).for_each(|i| put(&mut to.radiance, i, painted.emission(i) + painted.unlit(i)));
@@ -120,23 +128,23 @@ impl Kernel for Look<'_> {
             Model::MetalRough(m) if painted.any => {
                 let (mapped, emission) = (Mapped { m: *m, painted }, |i| painted.emission(i));
                 if let Some(overlays) = overlays {
-                    look(s, &mapped, (found, |_| true), to, points, (sky, ambient), |_| Vec3::ZERO);
-                    overlays.show(s, found, to, points, (sky, ambient), emission);
+                    look(s, &mapped, (found, |_| true), to, points, around, |_| Vec3::ZERO);
+                    overlays.show(s, found, to, points, around, emission);
                 } else if has_inside {
-                    look(s, &mapped, (found, |i| found.front[i] == 1), to, points, (sky, ambient), emission);
+                    look(s, &mapped, (found, |i| found.front[i] == 1), to, points, around, emission);
                 } else {
-                    look(s, &mapped, (found, |_| true), to, points, (sky, ambient), emission);
+                    look(s, &mapped, (found, |_| true), to, points, around, emission);
                 }
             }
             Model::MetalRough(m) => {
                 let even = Even { m: m.in_the_open(), row: m.shares(), mean: mean_albedo(m.roughness()) };
                 if let Some(overlays) = overlays {
-                    look(s, &even, (found, |_| true), to, points, (sky, ambient), |_| Vec3::ZERO);
-                    overlays.show(s, found, to, points, (sky, ambient), |_| emission);
+                    look(s, &even, (found, |_| true), to, points, around, |_| Vec3::ZERO);
+                    overlays.show(s, found, to, points, around, |_| emission);
                 } else if has_inside {
-                    look(s, &even, (found, |i| found.front[i] == 1), to, points, (sky, ambient), |_| emission);
+                    look(s, &even, (found, |i| found.front[i] == 1), to, points, around, |_| emission);
                 } else {
-                    look(s, &even, (found, |_| true), to, points, (sky, ambient), |_| emission);
+                    look(s, &even, (found, |_| true), to, points, around, |_| emission);
                 }
             }
         }
@@ -159,7 +167,7 @@ trait MetalRoughPoints {
     fn find_shares<S: Simd>(&self, s: S, points: usize, n_v: &Column, to: &mut [Column; 2]);
     /// Finds the means over the hemisphere of what white lobes send back, where they differ.
     fn find_means(&self, points: usize, means: &mut Column);
-    /// That of a point.
+    /// The mean albedo at a point.
     fn mean_albedo(&self, means: &Column, i: usize) -> f32;
     /// Share of the mirrored surroundings that nothing stands in the way of.
     fn open(&self, i: usize, n_v: f32) -> f32;
@@ -167,7 +175,7 @@ trait MetalRoughPoints {
     fn looks_up(&self) -> bool;
 }
 
-/// The same everywhere.
+/// A material that is the same everywhere.
 struct Even {
     m: MetalRoughBsdf,
     row: AlbedoRow,
@@ -259,7 +267,7 @@ fn look<S: Simd>(
     (found, outside): (&Found, impl Fn(usize) -> bool),
     to: &mut Surroundings,
     points: usize,
-    (sky, ambient): (&Sky, Vec3),
+    EnvironmentLight { sky, ambient }: EnvironmentLight,
     emission: impl Fn(usize) -> Vec3,
 ) {
     for i in 0..points.min(POINTS) {
@@ -290,7 +298,7 @@ fn look<S: Simd>(
             mirrored: get(&to.mirrored, i) + ambient,
             open: to.open[i],
             outside: outside(i),
-            // What scatters inside of itself has no strips.
+            // What scatters inside of itself has no batches.
             turned_back: 0.0,
         };
         let bsdf = m.bsdf(i);
@@ -334,7 +342,7 @@ pub(super) fn blur(sky: &Sky, roughness: impl Fn(usize) -> f32, dirs: &Columns, 
     }
 }
 
-/// The same for every point: such surroundings look alike in all directions.
+/// One radiance for every point: such surroundings look alike in all directions.
 #[inline(always)]
 fn fill(to: &mut Columns, points: usize, radiance: Vec3) {
     (0..points.min(POINTS)).for_each(|i| put(to, i, radiance));

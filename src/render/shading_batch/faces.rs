@@ -1,4 +1,4 @@
-//! The faces at the points of a strip: their numbers in columns, written for many points at once.
+//! The faces at the points of a batch: their numbers in columns, written for many points at once.
 
 use std::ops::Range;
 
@@ -37,7 +37,7 @@ pub(super) struct FaceNumbers {
     wide: [f64; WIDE_NUMBERS],
     /// The unit normal of its front.
     outward: [f32; 3],
-    /// Those of its corners.
+    /// The normals of its corners.
     normals: [f32; NORMAL_NUMBERS],
     curved: u32,
     prim: u32,
@@ -62,7 +62,7 @@ impl Skin {
         Self { numbers, extras: None }
     }
 
-    /// The same with other coordinates and colours at its corners.
+    /// This face with other coordinates and colours at its corners.
     pub(super) fn with(self, uvs: [Vec2; 3], colors: [Vec4; 3]) -> Self {
         let mut extras = [0.0; EXTRA_NUMBERS];
         extras[..6].copy_from_slice(uvs.map(|uv| uv.to_array()).as_flattened());
@@ -171,7 +171,7 @@ impl Faces {
         Vec3::new(self.outward[0][i], self.outward[1][i], self.outward[2][i])
     }
 
-    /// Those of the corners.
+    /// The normals of the corners.
     #[inline(always)]
     pub(super) fn normals(&self, i: usize) -> [Vec3; 3] {
         let n = |k: usize| self.normals[k][i];

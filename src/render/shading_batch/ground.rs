@@ -1,4 +1,4 @@
-//! Points of a strip one by one, for what no column knows: rays that go on through glass and off several lobes, rays to the
+//! Points of a batch one by one, for what no column knows: rays that go on through glass and off several lobes, rays to the
 //! surroundings, and what layers of a picture tell.
 
 use super::columns::{ShadingBatch, get, leave};

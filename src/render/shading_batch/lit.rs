@@ -1,4 +1,4 @@
-//! The light that arrives at the points of a strip, and the shadow rays that ask whether it does.
+//! The light that arrives at the points of a batch, and the shadow rays that ask whether it does.
 
 use super::area_lights::Drawn;
 use super::columns::{Column, Columns, Found, LANES, POINTS, ShadingBatch, get, leave, padded, put};
@@ -53,7 +53,7 @@ impl Default for Lit {
 
 impl ShadingBatch {
     /// Finds what `light` does at each point of a surface of `bsdf`, on which highlights may be narrow if it is
-    /// `shiny`; backs of what `has_inside`, which is shiny, are seen from inside. Of a wide light it is the `place`th
+    /// `shiny`; backs of what `has_inside`, which is shiny, are seen from inside. Of an area light it is the `place`th
     /// of those that each point has drawn.
     pub(crate) fn shine(
         &mut self,
@@ -66,33 +66,11 @@ impl ShadingBatch {
         let overlays = self.overlays.as_deref().filter(|over| over.any());
         let cones = shiny.then_some(&self.cones);
         let drawn = place.map(|place| (&mut self.drawn, place));
-        match drawn {
-            None => self.level.run(Shine::<false> {
-                found,
-                lit,
-                points,
-                bsdf,
-                painted,
-                whole,
-                overlays,
-                cones,
-                has_inside,
-                light,
-                drawn,
-            }),
-            Some(_) => self.level.run(Shine::<true> {
-                found,
-                lit,
-                points,
-                bsdf,
-                painted,
-                whole,
-                overlays,
-                cones,
-                has_inside,
-                light,
-                drawn,
-            }),
+        let shine = Shine { found, lit, points, bsdf, painted, whole, overlays, cones, has_inside, light, drawn };
+        if place.is_some() {
+            self.level.run(FromArea(shine))
+        } else {
+            self.level.run(FromPoint(shine))
         }
         if let Some(weights) = &self.weights {
             self.level.run(Weigh { weights, radiance: &mut self.lit.radiance, points });
@@ -116,7 +94,7 @@ impl ShadingBatch {
         self.lit_as(|seen| seen != 0).map(|(i, radiance)| (self.samples[i], radiance))
     }
 
-    /// Those of them whose shadow rays [`Self::send`] does not send: their numbers, and what they show.
+    /// The lit points whose shadow rays [`Self::send`] does not send: their numbers, and what they show.
     pub(crate) fn grazed(&self) -> impl Iterator<Item = (usize, Vec3)> {
         let any = self.lit.seen[..padded(self.count)].iter().fold(0, |all, seen| all | seen) & GRAZING != 0;
         self.lit_as(move |seen| any && seen == GRAZING)
@@ -149,7 +127,7 @@ impl ShadingBatch {
         shadows.take(count, std::iter::repeat_n(Media::default(), if absorbs { count } else { 0 }));
     }
 
-    /// The same where each starts inside of what the rays of the points are inside of.
+    /// Sends the shadow rays, each starting in the media that the ray of its point is in.
     pub(crate) fn send_within(&self, shadows: &mut ShadowQueue, traced: TracedRays) {
         let count = self.write(shadows.room());
         let rays = self.rays.iter().zip(&self.lit.seen).filter(|(_, seen)| **seen == PLAIN);
@@ -210,8 +188,8 @@ impl Kernel for Send<'_> {
     }
 }
 
-/// Wide lights have a kernel of their own, which leaves the other one its lanes.
-struct Shine<'a, const AREA: bool> {
+/// What one light does at points.
+struct Shine<'a> {
     found: &'a Found,
     lit: &'a mut Lit,
     points: usize,
@@ -225,15 +203,37 @@ struct Shine<'a, const AREA: bool> {
     cones: Option<&'a Cones>,
     has_inside: bool,
     light: &'a LocalLight,
-    /// What was drawn of it, and which of that counts, if it is wide.
+    /// What was drawn of it, and which of that counts, if it is an area light.
     drawn: Option<(&'a mut Drawn, u32)>,
 }
 
-impl<const AREA: bool> Kernel for Shine<'_, AREA> {
+/// Of a light without extent.
+struct FromPoint<'a>(Shine<'a>);
+
+impl Kernel for FromPoint<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
+        self.0.find::<false>();
+    }
+}
+
+/// Of an area light: a kernel of its own, which leaves the other one its lanes.
+struct FromArea<'a>(Shine<'a>);
+
+impl Kernel for FromArea<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        self.0.find::<true>();
+    }
+}
+
+impl Shine<'_> {
+    #[inline(always)]
+    fn find<const AREA: bool>(self) {
         let Self { found, lit, points, bsdf, painted, whole, overlays, cones, has_inside, light, mut drawn } = self;
         let (points, light) = (points.min(POINTS), *light);
         let in_lux = matches!(bsdf.model, Model::MetalRough(_));

@@ -2,6 +2,7 @@
 //! reflectance, or that scatter light to their other side: where they are and how they are seen is found side by side, what
 //! they are made of one by one, unless all their lobes are [overlays](super::overlays).
 
+use super::PlacedMesh;
 use super::columns::{POINTS, ShadingBatch, get};
 use super::constants::{Lobes, MaterialConstants};
 use super::material_maps::MaterialMaps;
@@ -16,7 +17,7 @@ use crate::render::shade_hits::TracedRays;
 use crate::render::surface::{HitPrim, side_of};
 use crate::render::whitted::SPREAD;
 use crate::render::world::Placement;
-use crate::scene::{Mesh, MetalRough};
+use crate::scene::MetalRough;
 
 impl ShadingBatch {
     /// Finds what the points of a mesh that an instance has placed so are made of, once their common maps have been read and
@@ -25,13 +26,13 @@ impl ShadingBatch {
         &mut self,
         context: &Context,
         traced: TracedRays,
-        (mesh, placement): (&Mesh, &Placement),
+        placed: PlacedMesh,
         common: &MaterialConstants,
     ) {
-        let metal_rough = context.scene.materials[mesh.material as usize].metal_rough();
+        let metal_rough = context.scene.materials[placed.mesh.material as usize].metal_rough();
         let (Some(m), Some(lobes)) = (metal_rough, common.lobes.filter(|lobes| !lobes.are_overlays)) else { return };
         let mut whole = std::mem::take(&mut self.whole);
-        self.each_lobe_frame(context, traced, (mesh, placement), (common, lobes), |i, on, reader| {
+        self.each_lobe_frame(context, traced, placed, (common, lobes), |i, on, reader| {
             let outside = self.found.front[i] == 1 || !common.has_inside();
             let bare = self.bare(i, &common.bsdf, outside);
             let Some(on) = on else { return whole.push(bare) };
@@ -53,7 +54,7 @@ impl ShadingBatch {
         &self,
         context: &Context,
         traced: TracedRays,
-        (mesh, placement): (&Mesh, &Placement),
+        PlacedMesh { mesh, placement }: PlacedMesh,
         (common, lobes): (&MaterialConstants, Lobes),
         mut tell: impl FnMut(usize, Option<&LobeFrame>, &Reader),
     ) {
@@ -115,7 +116,7 @@ impl ShadingBatch {
         }
     }
 
-    /// The same of highlights of clear coat alone.
+    /// Widens highlights of clear coat at point `i` so far that they are met by rays.
     pub(super) fn widen_coat(
         &self,
         i: usize,

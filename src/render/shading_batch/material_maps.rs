@@ -1,5 +1,6 @@
-//! Maps of a material and colours of vertices that points of a strip read side by side.
+//! Maps of a material and colours of vertices that points of a batch read side by side.
 
+use super::PlacedMesh;
 use super::columns::{Column, Columns, Found, Given, LANES, POINTS, ShadingBatch, get, padded, put};
 use super::cones::Cones;
 use super::constants::{other_maps, reads_reflectance};
@@ -119,7 +120,7 @@ impl MaterialMaps {
         Some(with_lobes.unwrap_or(material_maps))
     }
 
-    /// The same with the maps of lobes; `None` where one of them is read in another way, or there are too many coordinates.
+    /// These maps and those of lobes; `None` where one of them is read in another way, or there are too many coordinates.
     fn with_lobes(mut self, m: &MetalRough, store: &TextureStore) -> Option<Self> {
         for (map, space) in lobe_maps(m) {
             let layout = Layout::of(store, map.texture)?;
@@ -236,7 +237,7 @@ impl Group {
     }
 }
 
-/// The maps that strips know, and what for.
+/// The maps that batches know, and what for.
 fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
     let ([metal_rough, transmission], [ambient, specular, shininess]) = match &material.reflection {
         Reflection::MetalRough(m) => ([&m.metal_rough_map, &m.transmission_map].map(Option::as_ref), [None; 3]),
@@ -279,13 +280,13 @@ fn alone<'a>(alpha: Option<&'a TextureRef>, color: Option<&TextureRef>) -> Optio
 }
 
 impl ShadingBatch {
-    /// Reads what the maps of a sheet and the colours of vertices say at the points of a mesh that an instance has placed so, and
+    /// Reads what maps of a material and the colours of vertices say at the points of a mesh that an instance has placed so, and
     /// turns their normals. If lights show as highlights, which a normal map `widens`, it finds how far that turns them.
     pub(super) fn read_sheet(
         &mut self,
         context: &Context,
         (material, material_maps): (&Material, &MaterialMaps),
-        (mesh, placement): (&Mesh, &Placement),
+        PlacedMesh { mesh, placement }: PlacedMesh,
         widens: bool,
     ) {
         let count = self.count.min(POINTS);

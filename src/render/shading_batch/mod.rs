@@ -26,8 +26,18 @@ mod overlays;
 mod painted;
 mod through;
 
+use super::world::Placement;
+use crate::scene::Mesh;
+
 pub(crate) use columns::{POINTS, ShadingBatch};
 pub(crate) use constants::MaterialConstants;
 pub(crate) use ground::BatchPoint;
 pub(crate) use hits_by_instance::HitsByInstance;
 pub(crate) use through::Passed;
+
+/// A mesh, and where an instance has placed it.
+#[derive(Clone, Copy)]
+pub(crate) struct PlacedMesh<'a> {
+    pub mesh: &'a Mesh,
+    pub placement: &'a Placement,
+}

@@ -1,20 +1,18 @@
-//! Sheen and clear coat over the points of a strip.
+//! Sheen and clear coat over the points of a batch.
 //!
 //! They leave what lies under them as it is: that is found side by side as if there were none, and so is what they take off it
 //! and add to it.
 
+use super::PlacedMesh;
 use super::columns::{Column, Columns, Found, POINTS, ShadingBatch, get, put};
 use super::constants::MaterialConstants;
-use super::environment::{Surroundings, blur};
+use super::environment::{EnvironmentLight, Surroundings, blur};
 use super::lit::Lit;
 use crate::math::Vec3;
 use crate::math::simd::{LANES, Simd};
 use crate::render::context::Context;
 use crate::render::shade::{CoatLobe, Model, SheenLobe, albedo_of_each, overlays, terminator};
 use crate::render::shade_hits::TracedRays;
-use crate::render::sky::Sky;
-use crate::render::world::Placement;
-use crate::scene::Mesh;
 
 /// Both of each point: those of their numbers that maps and views change.
 pub(super) struct Overlays {
@@ -70,16 +68,16 @@ impl ShadingBatch {
         &mut self,
         context: &Context,
         traced: TracedRays,
-        (mesh, placement): (&Mesh, &Placement),
+        placed: PlacedMesh,
         common: &MaterialConstants,
     ) {
-        let metal_rough = context.scene.materials[mesh.material as usize].metal_rough();
+        let metal_rough = context.scene.materials[placed.mesh.material as usize].metal_rough();
         let (Some(m), Some(lobes)) = (metal_rough, common.lobes.filter(|lobes| lobes.are_overlays)) else { return };
         let Model::MetalRough(even) = &common.bsdf.model else { return };
         let even = even.inputs().occlusion;
         let mut over = self.overlays.take().unwrap_or_default();
         (over.has_sheen, over.has_coat) = (m.sheen.is_some(), m.coat.is_some());
-        self.each_lobe_frame(context, traced, (mesh, placement), (common, lobes), |i, on, reader| {
+        self.each_lobe_frame(context, traced, placed, (common, lobes), |i, on, reader| {
             let Some(on) = on else { return over.put(i, &(None, None)) };
             let occlusion = if self.painted.any { self.painted.occlusion[i] } else { even };
             let (sheen, mut coat) = overlays(m, on, occlusion, reader);
@@ -186,7 +184,7 @@ impl Overlays {
         found: &Found,
         to: &mut Surroundings,
         points: usize,
-        (sky, ambient): (&Sky, Vec3),
+        around: EnvironmentLight,
         emission: impl Fn(usize) -> Vec3,
     ) {
         let points = points.min(POINTS);
@@ -196,10 +194,10 @@ impl Overlays {
             put(&mut to.radiance, i, all);
         }
         if self.has_sheen {
-            self.show_sheen(found, to, points, (sky, ambient));
+            self.show_sheen(found, to, points, around);
         }
         if self.has_coat {
-            self.show_coat(s, found, to, points, (sky, ambient));
+            self.show_coat(s, found, to, points, around);
         }
         for i in 0..points {
             let [below_coat, _] = self.clear_at(i);
@@ -209,15 +207,15 @@ impl Overlays {
     }
 
     #[inline(always)]
-    fn show_sheen(&mut self, found: &Found, to: &mut Surroundings, points: usize, (sky, ambient): (&Sky, Vec3)) {
+    fn show_sheen(&mut self, found: &Found, to: &mut Surroundings, points: usize, around: EnvironmentLight) {
         for i in 0..points {
             put(&mut self.dirs, i, found.seen(i).mirrored());
         }
         let Self { dirs, light, sheen_roughness, .. } = self;
-        blur(sky, |i| SheenLobe::blur(sheen_roughness[i]), dirs, points, light);
+        blur(around.sky, |i| SheenLobe::blur(sheen_roughness[i]), dirs, points, light);
         for i in 0..points {
             let [below_coat, _] = self.clear_at(i);
-            let sheen = self.sheen(i).around(get(&self.light, i) + ambient) * below_coat;
+            let sheen = self.sheen(i).around(get(&self.light, i) + around.ambient) * below_coat;
             let all = get(&to.radiance, i) + sheen;
             put(&mut to.radiance, i, all);
         }
@@ -230,7 +228,7 @@ impl Overlays {
         found: &Found,
         to: &mut Surroundings,
         points: usize,
-        (sky, ambient): (&Sky, Vec3),
+        around: EnvironmentLight,
     ) {
         // Of what is as smooth as clear coat mostly is rays show all.
         let looked_up = (0..points).fold(false, |any, i| any | (self.coat(i).looked_up() > 0.0));
@@ -243,7 +241,7 @@ impl Overlays {
             put(&mut self.dirs, i, dir);
         }
         let Self { dirs, light, coat_roughness, n_v, shares: [scale, bias], .. } = self;
-        blur(sky, |i| coat_roughness[i], dirs, points, light);
+        blur(around.sky, |i| coat_roughness[i], dirs, points, light);
         let at = coat_roughness.as_chunks().0.iter().zip(n_v.as_chunks().0);
         let eights = scale.as_chunks_mut().0.iter_mut().zip(bias.as_chunks_mut().0);
         for ((roughness, n_v), (scale, bias)) in at.zip(eights).take(points.div_ceil(LANES)) {
@@ -251,7 +249,7 @@ impl Overlays {
         }
         for i in 0..points {
             let share = self.coat(i).share_looked_up((self.shares[0][i], self.shares[1][i]));
-            let all = get(&to.radiance, i) + (get(&self.light, i) + ambient) * share;
+            let all = get(&to.radiance, i) + (get(&self.light, i) + around.ambient) * share;
             put(&mut to.radiance, i, all);
         }
     }

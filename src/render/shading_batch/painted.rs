@@ -1,9 +1,10 @@
-//! What maps and colours of vertices say at the points of a strip.
+//! What maps and colours of vertices say at the points of a batch.
 //!
 //! They are mostly read side by side ([`MaterialMaps`](super::material_maps::MaterialMaps)), else point by point, as
 //! [`Surface`](crate::render::surface::Surface) reads them; what follows from them is computed side by side. So is what
 //! follows from how far rough surfaces on the way have blurred what is seen, which makes any material rougher.
 
+use super::PlacedMesh;
 use super::columns::{Column, Columns, POINTS, ShadingBatch, get, padded, put};
 use super::constants::MaterialConstants;
 use crate::accel::NO_PRIM;
@@ -16,8 +17,7 @@ use crate::render::shade::{
 use crate::render::shade_hits::TracedRays;
 use crate::render::surface::{HitPrim, mapped_normal, side_of};
 use crate::render::whitted::SPREAD;
-use crate::render::world::Placement;
-use crate::scene::{Material, Mesh};
+use crate::scene::Material;
 
 /// A material at each point: those of its numbers that maps change.
 pub(super) struct Painted {
@@ -35,7 +35,7 @@ pub(super) struct Painted {
     specular: Columns,
     mirror: Columns,
     shininess: Column,
-    /// The texel of a normal map of a sheet.
+    /// The texel of a normal map that was read side by side.
     normal: Columns,
 }
 
@@ -185,14 +185,16 @@ impl ShadingBatch {
         &mut self,
         context: &Context,
         traced: TracedRays,
-        (mesh, placement): (&Mesh, &Placement),
+        placed: PlacedMesh,
         common: &MaterialConstants,
     ) {
-        let material = &context.scene.materials[mesh.material as usize];
+        let material = &context.scene.materials[placed.mesh.material as usize];
         self.painted.any = true;
         let widens = !context.lights.is_empty() && material.metal_rough().is_some();
-        if let Some(material_maps) = common.material_maps.as_ref().filter(|material_maps| material_maps.covers(mesh)) {
-            self.read_sheet(context, (material, material_maps), (mesh, placement), widens);
+        if let Some(material_maps) =
+            common.material_maps.as_ref().filter(|material_maps| material_maps.covers(placed.mesh))
+        {
+            self.read_sheet(context, (material, material_maps), placed, widens);
             return;
         }
         let (mut prim, mut patch) = (NO_PRIM, None);

@@ -1,4 +1,4 @@
-//! What lies behind the points of a strip that are not there as a whole: backs of one-sided faces, absent texels, what
+//! What lies behind the points of a batch that are not there as a whole: backs of one-sided faces, absent texels, what
 //! is blended.
 
 use super::columns::{POINTS, ShadingBatch, get, put};

@@ -36,8 +36,8 @@ struct Turn {
 }
 
 impl Turn {
-    /// That of a lobe seen from `view`, by all bits of both: what so few lookups miss of a small sun is noise then, which more
-    /// samples lessen and pixels know of, and no pattern on the surface.
+    /// The turn for a lobe seen from `view`, by all bits of both: what so few lookups miss of a small sun is noise then,
+    /// which more samples lessen and pixels know of, and no pattern on the surface.
     fn of(lobe: &Lobe, view: Vec3) -> Self {
         let bits = [lobe.facet(view, [0.5; 2]), view].into_iter().flat_map(|v| v.to_array().map(f32::to_bits));
         let seed = bits.fold(0, mix);

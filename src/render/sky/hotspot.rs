@@ -29,7 +29,7 @@ pub(super) struct Hotspot {
 }
 
 impl Hotspot {
-    /// That of a panorama, if it has any.
+    /// The hotspot of a panorama, if it has one.
     pub(super) fn of(pyramid: &Pyramid) -> Option<Self> {
         let level = pyramid.at_most(COLUMNS);
         let mut each: Vec<(Vec3, f32)> = level.each().collect();
@@ -78,7 +78,8 @@ impl Sky {
         self.map.as_ref().and_then(|map| map.hotspot.as_ref()).map(|hotspot| hotspot.area)
     }
 
-    /// Whether light is worth a ray to hotspot that adds it, where what weighs less than `cutoff` is not: beside what is calm.
+    /// Whether light is worth a ray to the hotspot that adds it, where what weighs less than `cutoff` is not: beside what
+    /// is calm.
     pub(crate) fn is_worth_a_ray(&self, light: Vec3, cutoff: f32) -> bool {
         /// Much less than a weight, as suns are bright.
         const PART: f32 = 1.0 / 16.0;

@@ -65,7 +65,7 @@ impl Sky {
         Self { environment: scene.environment, up: scene.up, backdrop, is_toned, walls: 1.0, map }
     }
 
-    /// The same with so many times as bright walls behind everything.
+    /// This sky with walls so many times as bright behind everything.
     pub(crate) fn before_walls(self, walls: f32) -> Self {
         Self { walls, ..self }
     }

@@ -100,7 +100,7 @@ impl Level {
         Self { width, height, texels: Arc::default() }
     }
 
-    /// The same places with these texels, row by row.
+    /// A panorama of the same size with these texels, row by row.
     pub(super) fn made_of(self, texels: Vec<[f32; 3]>) -> Self {
         Self { texels: Arc::new(texels), ..self }
     }
@@ -116,7 +116,7 @@ impl Level {
         (0..self.height).flat_map(row)
     }
 
-    /// The same with other texels.
+    /// A panorama of the same size with other texels.
     pub(super) fn with(&self, texel: impl Fn(Vec3) -> Vec3) -> Self {
         let texels = self.texels.iter().map(|&light| texel(light.into()).to_array()).collect();
         Self { texels: Arc::new(texels), ..*self }
@@ -132,7 +132,7 @@ impl Level {
         self.area_between(f64::from(row), f64::from(row + 1))
     }
 
-    /// The same of what is as wide as a texel and reaches from here to there, in rows.
+    /// Solid angle of what is as wide as a texel and reaches from here to there, in rows.
     fn area_between(&self, from: f64, to: f64) -> f32 {
         let edge = |row: f64| libm::cos(std::f64::consts::PI * row / f64::from(self.height));
         #[expect(clippy::cast_possible_truncation, reason = "an area of the unit sphere")]

@@ -80,7 +80,7 @@ fn scramble(x: u32, key: u32) -> u32 {
     turned(x.reverse_bits(), key).reverse_bits()
 }
 
-/// The same where the bits above come first, as the lowest.
+/// [`scramble`] of reversed bits: those above come first, as the lowest.
 #[inline(always)]
 fn turned(mut x: u32, key: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);

@@ -140,7 +140,7 @@ fn copy((to, to_step): (&mut [f32], usize), (from, from_step): (&[f32], usize), 
     }
 }
 
-/// The same of rows so wide.
+/// Copies rows of one width.
 #[inline(always)]
 fn copy_rows<const WIDTH: usize>(
     (to, to_step): (&mut [f32], usize),

@@ -53,7 +53,7 @@ impl Places {
         self.send(frame, how, roulette, tracer)
     }
 
-    /// The same for the sample of this index of each of the pixels in these columns and rows.
+    /// Traces the sample of this index of each of the pixels in these columns and rows.
     pub(in crate::render) fn trace_each<A: Accel, P: Observer>(
         &mut self,
         frame: &Frame,

@@ -145,7 +145,7 @@ fn points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one() {
     }
 }
 
-/// The same with maps of everything that points side by side may read, tangents, and colours at the vertices of some meshes.
+/// A stage with maps of everything that points side by side may read, tangents, and colours at the vertices of some meshes.
 fn painted() -> Stage {
     let mut s = plain();
     let mut random = Random::new(8);
@@ -214,7 +214,7 @@ fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one()
     }
 }
 
-/// The same with surfaces that are there in part, or nowhere, as maps, vertices or their materials say, and seen from behind.
+/// `s` with surfaces that are there in part, or nowhere, as maps, vertices or their materials say, and seen from behind.
 fn holed(mut s: Stage) -> Stage {
     let mut random = Random::new(3);
     for (i, material) in s.scene.materials.iter_mut().enumerate() {
@@ -246,7 +246,7 @@ fn points_that_are_there_in_part_have_the_same_bits_side_by_side() {
     }
 }
 
-/// The same with glass: clear and coloured, smooth and rough, thin and thick, with things in it that absorb light, and maps.
+/// `s` with glass: clear and coloured, smooth and rough, thin and thick, with things in it that absorb light, and maps.
 fn glazed(mut s: Stage, textures: usize) -> Stage {
     s.settings = Settings { depth: Some(6), samples: 2, ..s.settings };
     let pane = |half: f32, thick: f32| {
@@ -342,7 +342,7 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
     }
 }
 
-/// The same with more lobes over what is metallic-rough, one or several each: their maps and those of reflectance are of so many
+/// `s` with more lobes over what is metallic-rough, one or several each: their maps and those of reflectance are of so many
 /// textures.
 fn lobed(mut s: Stage, textures: u32) -> Stage {
     let turned = UvTransform { scale: Vec2::new(2.0, -1.5), rotation: 0.7, ..UvTransform::default() };
@@ -413,7 +413,7 @@ fn lobes_shaded_side_by_side_have_the_bits_of_lobes_shaded_one_by_one() {
     }
 }
 
-/// The same with sheen and clear coat alone over what is metallic-rough, one or both, smooth and rough, their maps of so many
+/// `s` with sheen and clear coat alone over what is metallic-rough, one or both, smooth and rough, their maps of so many
 /// textures.
 fn overlaid(mut s: Stage, textures: u32) -> Stage {
     let map = |i: usize, texture: u32| {

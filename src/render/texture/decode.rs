@@ -32,7 +32,7 @@ pub(super) fn fixed8(space: ColorSpace) -> &'static [u32; 256] {
     }
 }
 
-/// The same of numbers that are no colours.
+/// Stored 8-bit numbers that are no colours, in the units of [`fixed8`].
 static FIXED_UNIT8: [u32; 256] = {
     let (mut table, mut i) = ([0; 256], 0);
     while i < 256 {
@@ -71,7 +71,7 @@ pub(super) enum Texels<'a> {
 }
 
 impl<'a> Texels<'a> {
-    /// Those of a bitmap, for one meaning.
+    /// The texels of a bitmap, for one meaning.
     #[inline]
     pub(super) fn new(bitmap: &'a Bitmap, space: ColorSpace) -> Self {
         match &bitmap.pixels {
@@ -114,7 +114,7 @@ pub(super) fn unit8(code: u8) -> f32 {
     f32::from(code) / 255.0
 }
 
-/// The same of more bits.
+/// A stored number of 16 bits that is no colour, 0 … 1.
 #[inline(always)]
 pub(super) fn unit16(code: u16) -> f32 {
     f32::from(code) / 65535.0

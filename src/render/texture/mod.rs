@@ -27,7 +27,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub enum ColorSpace {
     /// Colours: red, green and blue follow the sRGB curve, alpha is linear and a number of its own.
     Srgb,
-    /// The same where alpha says what is there: it weights the colours in smaller copies.
+    /// Colours where alpha says what is there: it weights the colours in smaller copies.
     SrgbCutOut,
     /// Data: four independent linear channels.
     Linear,

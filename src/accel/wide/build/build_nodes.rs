@@ -78,10 +78,10 @@ impl TreeBuilder {
         self.open[at].at = index(self.open.len() - at);
         second(self);
         self.above -= 1;
-        debug_assert_eq!(pieces, self.pieces.len(), "a build_node that was not shared went to another piece");
+        debug_assert_eq!(pieces, self.pieces.len(), "a node that was not shared went to another piece");
     }
 
-    /// The same by two threads.
+    /// Adds a node with two sides, each built by a thread of its own.
     pub(super) fn fork_shared(
         &mut self,
         bounds: Aabb,
@@ -137,10 +137,7 @@ impl TreeBuilder {
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "build_nodes are fewer than twice the prims, and take 32 bytes each"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "they are fewer than twice the prims, and take 32 bytes each")]
 pub(super) fn index(i: usize) -> u32 {
     i as u32
 }

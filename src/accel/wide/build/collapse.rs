@@ -123,7 +123,7 @@ impl Nodes {
         Self { pieces, depth }
     }
 
-    /// These nodes, in these bounds, and room for so many blocks.
+    /// The arrays of a tree of these nodes, with its bounds and room for so many blocks.
     pub(super) fn into_arrays(self, blocks: usize, bounds: Aabb) -> Arrays {
         Arrays::new(&self.pieces, self.depth, blocks, bounds)
     }

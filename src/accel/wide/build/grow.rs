@@ -136,7 +136,7 @@ impl Grower {
         );
     }
 
-    /// The same for some parts of a cell.
+    /// Builds the subtree of some parts of a cell.
     fn grow_cell(&self, cell: &Cell, parts: u8, work: Work, bounds: Bounds, growth: &mut TreeBuilder) {
         let Some(first) = cell.cut(parts) else { return self.grow(work, bounds, None, growth) };
         let second = parts & !first;

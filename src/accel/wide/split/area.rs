@@ -166,7 +166,7 @@ pub(in crate::accel) fn cut_by_area(items: &mut [Item], leaf: u32, middles: Opti
     if items.len() <= FEW { cut_in::<{ BINS / 2 }>(items, leaf, middles) } else { cut_in::<BINS>(items, leaf, middles) }
 }
 
-/// The same between `N` bins.
+/// Cuts items between two of `N` bins.
 fn cut_in<const N: usize>(items: &mut [Item], leaf: u32, middles: Option<Bounds>) -> Cut {
     let many = items.len() > MANY;
     let ruler = Ruler::over(&middles.unwrap_or_else(|| around_middles(items)), N);
@@ -203,7 +203,7 @@ fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
     at
 }
 
-/// The same, and the boxes of both parts; by several threads.
+/// Partitions items by several threads, and finds the boxes of both parts.
 fn shared_partition(items: &mut [Item], first: &(impl Fn(&Item) -> bool + Sync)) -> Cut {
     if items.len() <= SHARED {
         return measured_partition(items, first);
@@ -219,7 +219,7 @@ fn shared_partition(items: &mut [Item], first: &(impl Fn(&Item) -> bool + Sync))
     Cut { at: a.at + b.at, prims: a.prims + b.prims, bounds: both(a.bounds, b.bounds), middles }
 }
 
-/// The same by one.
+/// Partitions items by one thread, and finds the boxes of both parts.
 fn measured_partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> Cut {
     let (mut at, mut prims, mut bounds, mut middles) = (0, 0, [Bounds::EMPTY; 2], [Bounds::EMPTY; 2]);
     for i in 0..items.len() {

@@ -46,7 +46,7 @@ impl Bounds {
         d.x * d.y * d.z
     }
 
-    /// The same box in memory.
+    /// The box as structures store it.
     #[inline]
     pub(in crate::accel) fn aabb(&self) -> Aabb {
         Aabb { lo: self.lo.truncate(), hi: self.hi.truncate() }
@@ -137,7 +137,7 @@ impl Item {
         1 + u32::from(self.0.hi.w.to_bits() & TWO != 0)
     }
 
-    /// All of them.
+    /// All its prims.
     #[inline(always)]
     pub(in crate::accel) fn prims(&self) -> Range<u32> {
         self.prim()..self.prim() + self.count()

@@ -62,7 +62,7 @@ pub(crate) struct MetalRoughBsdf {
     least_square: f32,
 }
 
-/// Those of its parameters that maps of its colour, roughness, metalness, occlusion and transmission change.
+/// The parameters that maps of colour, roughness, metalness, occlusion and transmission change.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MetalRoughInputs {
     pub base: Vec3,
@@ -164,7 +164,7 @@ impl MetalRoughBsdf {
         MetalRoughInputs { base, metallic, roughness, occlusion, transmission }
     }
 
-    /// The same with other numbers of maps, where no film is over it.
+    /// This material with other numbers from maps, where no film is over it.
     #[inline(always)]
     pub(crate) fn painted(&self, inputs: MetalRoughInputs) -> Self {
         let MetalRoughInputs { base, metallic, roughness, occlusion, transmission } = inputs;
@@ -234,7 +234,7 @@ impl MetalRoughBsdf {
         if self.has_narrow_highlight() { least_square(self.roughness, to) } else { 0.0 }
     }
 
-    /// The same with highlights of this α² at least.
+    /// This material with highlights of this α² at least.
     #[inline(always)]
     pub(crate) fn at_least(&self, least_square: f32) -> Self {
         Self { least_square, ..*self }
@@ -292,7 +292,7 @@ impl MetalRoughBsdf {
         self.base * ((1.0 - self.metallic) * (1.0 - self.transmission) * (1.0 - self.share))
     }
 
-    /// The same of the light that is scattered to the other side.
+    /// Colour of the light that is scattered to the other side, before what the surface reflects is taken off.
     fn scattered_through(&self) -> Vec3 {
         self.through * ((1.0 - self.metallic) * (1.0 - self.transmission) * self.share)
     }
@@ -308,7 +308,7 @@ impl MetalRoughBsdf {
         self.lit_on_side(normal, view, to_light, true)
     }
 
-    /// The same, without highlights where it is seen from inside.
+    /// BRDF × N·L, without highlights where it is seen from inside.
     #[inline(always)]
     pub(crate) fn lit_on_side(&self, normal: Vec3, view: Vec3, to_light: Vec3, outside: bool) -> Vec3 {
         let a2 = squared_width(self.roughness).max(self.least_square);
@@ -319,7 +319,7 @@ impl MetalRoughBsdf {
         self.lit_by(normal, view, to_light, lobe)
     }
 
-    /// The same with another lobe: what it gives for the sum of both unit vectors, before Fresnel.
+    /// BRDF × N·L with another lobe: what it gives for the sum of both unit vectors, before Fresnel.
     #[inline(always)]
     pub(super) fn lit_by(&self, normal: Vec3, view: Vec3, to_light: Vec3, lobe: impl Fn(Vec3) -> f32) -> Vec3 {
         let (n_l, n_v) = (normal.dot(to_light), normal.dot(view));
@@ -452,7 +452,7 @@ impl MetalRoughBsdf {
         self.roughness
     }
 
-    /// The same where an occlusion map leaves everything open, as without one.
+    /// This material where an occlusion map leaves everything open, as without one.
     pub(crate) fn in_the_open(&self) -> Self {
         Self { occlusion: 1.0, ..*self }
     }
