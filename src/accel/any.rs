@@ -141,7 +141,7 @@ pub struct AnyScratch(Box<dyn Any + Send>);
 
 /// A question that can be asked of any structure.
 trait Question {
-    /// Whether nobody listens to how it is answered.
+    /// Whether the probe records nothing of how it is answered.
     const SILENT: bool;
 
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch);

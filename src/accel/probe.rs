@@ -117,7 +117,7 @@ impl Extent {
 pub struct Test {
     /// Which prim.
     pub prim: u32,
-    /// Where the ray meets it; NaN where it does not, or where nobody looked.
+    /// Where the ray meets it; NaN where it does not, or where that was not computed.
     pub t: f32,
     /// What came of it.
     pub outcome: Outcome,
@@ -128,7 +128,7 @@ pub struct Test {
 pub enum Outcome {
     /// The ray passes by.
     Miss,
-    /// It was among a block of prims, but nobody asks about it: the ray starts on it, it is not opaque and only opaque
+    /// It was in a block of prims but does not count: the ray starts on it, it is not opaque and only opaque
     /// ones are looked for, or the answer is known already.
     LeftOut,
     /// It is hit, but not within the range that is asked about.

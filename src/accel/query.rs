@@ -61,7 +61,7 @@ pub trait Goal {
         true
     }
 
-    /// Who knows where prims that are not opaque are not there, if anybody is asked, and the ray's number there.
+    /// The filter of first hits, if there is one, and the ray's number in its batch.
     #[inline(always)]
     fn filter(&self) -> Option<(&dyn IntersectFilter, usize)> {
         None
@@ -101,7 +101,7 @@ pub struct Query<'a, G: Goal> {
     winner: Option<Winner>,
 }
 
-/// What the answer needs of a triangle, so that nobody looks it up again.
+/// What the answer needs of a triangle, so that it is not looked up again.
 #[derive(Clone, Copy, Debug)]
 struct Winner {
     prim: u32,
@@ -379,7 +379,7 @@ impl<I: Intersector> Goal for Closest<'_, I> {
 /// Whether anything is hit that stops light: what is opaque, and what others say does so where it is hit.
 pub struct Occluded<'w, I> {
     pub(super) found: bool,
-    /// Who knows of prims that are not opaque, and the ray's number there.
+    /// The filter of occlusion queries, if there is one, and the ray's number in its batch.
     filter: Option<&'w dyn OccludedFilter>,
     ray: usize,
     test: I,

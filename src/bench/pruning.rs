@@ -8,7 +8,7 @@ use crate::render::{Job, render};
 pub struct Pruning {
     /// Seconds of processor time of a rendering as usual.
     pub usual: Spread,
-    /// The same with every code path on (`--no-prune`).
+    /// Seconds with every code path on (`--no-prune`).
     pub everything: Spread,
     /// Whether the pixels were the same bits in all renderings.
     pub same: bool,

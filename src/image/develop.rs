@@ -189,21 +189,21 @@ impl<'a> Developer<'a> {
         lanes.map(|[c]| c)
     }
 
-    /// The same before a background that comes through glass, too.
+    /// [`Self::coded`] before a background that comes through glass, too.
     pub(crate) fn coded_through_glass(&self, pixel: [f32; 4], veil: [f32; 4]) -> [f32; 4] {
         let mut lanes = pixel.map(|c| [c]);
         self.coded_glass(&mut lanes, &veil.map(|c| [c]));
         lanes.map(|[c]| c)
     }
 
-    /// The same for pixels side by side, each channel in a row of its own.
+    /// [`Self::coded`] for pixels side by side, each channel in a row of its own.
     #[inline(always)]
     pub(crate) fn coded_lanes<const N: usize>(&self, pixels: &mut [[f32; N]; 4]) {
         self.develop(pixels);
         self.code(pixels);
     }
 
-    /// The same before a background that comes through glass, too ([`Picture::veil`]).
+    /// [`Self::coded_lanes`] before a background that comes through glass, too ([`Picture::veil`]).
     #[inline(always)]
     pub(crate) fn coded_glass<const N: usize>(&self, pixels: &mut [[f32; N]; 4], veil: &[[f32; N]; 4]) {
         self.develop_glass(pixels, veil);

@@ -278,7 +278,7 @@ impl Channels<'_> {
         self.floats_or(name, 0.0)
     }
 
-    /// The same, `outside` where none are stored.
+    /// The values that are shown, `outside` where none are stored.
     fn floats_or(&self, name: &str, outside: f32) -> Option<Vec<f32>> {
         self.find(name).map(|samples| self.window.shown(samples.values_as_f32().collect(), outside))
     }

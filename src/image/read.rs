@@ -23,7 +23,7 @@ pub fn read_picture(path: &Path) -> Result<Picture, ImageError> {
     read_picture_file(path).map(|file| file.picture)
 }
 
-/// The same, with what kind of file it is and what of it was not read.
+/// Reads a picture, and tells what kind of file it is and what of it was not read.
 pub fn read_picture_file(path: &Path) -> Result<PictureFile, ImageError> {
     let bytes = std::fs::read(path).map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
     decode_file(&bytes, MAX_PIXELS)

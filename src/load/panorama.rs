@@ -46,7 +46,7 @@ pub fn load(path: &Path, limits: &Limits) -> Result<LoadedPanorama, LoadError> {
     decode(&super::read_file(path, limits)?, limits)
 }
 
-/// The same from memory.
+/// Reads a panorama from memory.
 ///
 /// # Errors
 /// As [`load`].

@@ -20,7 +20,7 @@ pub(super) fn read(file: File, length: u64, most: u64) -> io::Result<Vec<u8>> {
     read_in_turn(file, length, most)
 }
 
-/// The same by this thread alone.
+/// Reads a whole file by this thread alone.
 ///
 /// # Errors
 /// Those of the system.

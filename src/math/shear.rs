@@ -46,7 +46,7 @@ impl RaySpace {
         usable.then_some(space)
     }
 
-    /// The same, and whether the ray can hit.
+    /// The space of a ray, and whether it can hit.
     #[inline(always)]
     pub fn checked(origin: Vec3, dir: Vec3) -> (Self, bool) {
         let z = main_axis(dir);

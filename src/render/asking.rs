@@ -5,7 +5,7 @@ use super::filters::Through;
 use super::observer::{Observer, Question};
 use crate::accel::{Accel, Hit, HitQueries, IntersectFilter, OccludedFilter, Ray};
 
-/// A structure, one worker's scratch for it, and whoever may end the work.
+/// A structure, one worker's scratch for it, and the progress by which a user may cancel.
 pub(crate) struct Asking<'a, A: Accel> {
     accel: &'a A,
     scratch: A::Scratch,

@@ -24,7 +24,7 @@ use crate::scene::features::{Feature, Features};
 use crate::scene::{Background, Material, Scene};
 use std::sync::Arc;
 
-/// Rays to a panorama from each point, when nobody says.
+/// Rays to a panorama from each point by default.
 const ENV_RAYS: u32 = 16;
 
 /// Shadow rays that wait before they are traced, and …
@@ -75,7 +75,7 @@ pub(crate) struct Context<'a> {
     pub gloss: Gloss,
     /// Whether rays may be spread by chance.
     pub meets_by_chance: bool,
-    /// What such rays were found to meet seldom, and far brighter than all else, if anybody has looked.
+    /// What such rays were found to meet seldom, and far brighter than all else, if that was looked for.
     pub fireflies: Option<Arc<Fireflies>>,
     /// Samples of all pixels that are traced before the picture, with which they start; 0: none.
     pub first_samples: u32,
@@ -110,9 +110,9 @@ pub(crate) struct Gloss {
 }
 
 impl Gloss {
-    /// What is asked for, `None`: what nobody says.
+    /// What is asked for; `None`: the default.
     pub(crate) fn new(asked: Option<u32>) -> Self {
-        /// Rays through frosted glass, when nobody says.
+        /// Rays through frosted glass by default.
         const GLASS: u32 = 4;
         Self { rays: asked.unwrap_or(GLASS), width: 1.0, all: asked.is_some_and(|rays| rays > 0) }
     }

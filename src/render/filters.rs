@@ -132,7 +132,7 @@ impl Met {
     }
 }
 
-/// What of a picture's scene lets light through, for whoever asks its shadow rays again.
+/// What of a picture's scene lets light through, for shadow rays that are asked again.
 pub struct Filters<'a>(Context<'a>);
 
 /// What was met on the way of rays that are asked again: room that is used again.

@@ -194,7 +194,7 @@ pub(super) fn look<P: Observer>(
     let (each, mut counts, complete) = each_tile(context, accel, &tiles(width, height), &Quiet(progress), work);
     let all = each.into_iter().sum();
     let mut rays = Rays { all, beside: all };
-    // Who has cancelled wants no more of the picture, either.
+    // After cancelling the picture is not wanted, either.
     if !complete {
         return (rays, counts);
     }

@@ -21,7 +21,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// The sum of such values over that of their weights, times `scale`; of a single one nobody knows how far off it is.
+    /// The sum of such values over that of their weights, times `scale`; how far off a single one is remains unknown.
     /// (W. G. Cochran, *Sampling Techniques*, 1977, §6.4: how far a ratio is off.)
     pub(super) fn of_ratio(weighted: &[(f64, f64)], scale: f64) -> Self {
         /// Standard errors to both sides.

@@ -21,7 +21,7 @@ pub enum Instancing {
 
 names!(Instancing, "way with instances", Auto => "auto", Keep => "keep", Flatten => "flatten");
 
-/// Triangles from which on a mesh is worth a tree of its own, where nobody says so.
+/// Triangles from which on a mesh is worth a tree of its own by default.
 const WORTH_A_TREE: usize = 64;
 
 /// Triangles that instancing must save: flattened, so many take 20 MB with the tree over them, and rays through one tree are

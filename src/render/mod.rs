@@ -232,7 +232,7 @@ pub trait Progress: Sync {
     fn begins(&self) {}
 }
 
-/// Nobody listens.
+/// Progress that nothing is told of and that never cancels.
 impl Progress for () {
     fn tiles(&self, _done: usize, _total: usize) {}
     fn cancelled(&self) -> bool {

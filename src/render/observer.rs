@@ -25,7 +25,7 @@ pub(crate) trait Observer: Probe {
     /// second. 1 where the walk's calls must be told apart by ray.
     const SLICE: usize = 256;
 
-    /// Whether rays may pass gaps that are known without a word: where nobody counts or keeps what is asked.
+    /// Whether rays may pass known gaps without telling: where queries are neither counted nor recorded.
     const PASSES_GAPS: bool = false;
 
     /// These rays are asked now; `after` has the hit of each behind which it goes on, where that is the question.

@@ -44,7 +44,7 @@ pub(crate) struct ShadowQueue {
 #[repr(C)]
 pub(crate) struct Bound {
     pub radiance: Vec3,
-    /// Where it arrives: its ray's sample, or what else whoever sent it says.
+    /// Where it arrives: its ray's sample, or what else its sender has said.
     pub tag: u32,
 }
 

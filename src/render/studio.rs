@@ -1,4 +1,4 @@
-//! The built-in studio: what rays that leave the scene see when nobody brought an environment.
+//! The built-in studio: what rays that leave the scene see when there is no other environment.
 //!
 //! A neutral room as photographers light small things: a light dome that falls off to a darker floor and a dark backdrop,
 //! a large soft box overhead in front, a strip to the left, a panel to the right and a rim light behind. Who looks at the

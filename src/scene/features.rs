@@ -93,7 +93,7 @@ pub struct Features {
 pub const SMOOTH: f32 = 0.2;
 
 impl Feature {
-    /// All of them, in the order they are listed.
+    /// All features, in the order they are listed.
     pub const ALL: [Self; 35] = [
         Self::Triangles,
         Self::Polygons,

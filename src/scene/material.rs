@@ -416,7 +416,7 @@ impl Reflection {
         }
     }
 
-    /// The same without glass: nothing passes it, and it has no inside.
+    /// This material without glass: nothing passes it, and it has no inside.
     #[must_use]
     pub fn without_transmission(self) -> Self {
         match self {

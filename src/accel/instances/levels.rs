@@ -179,7 +179,8 @@ impl<'a> TwoLevel<'a> {
     }
 }
 
-/// Who is asked of prims by the numbers that they have in the tree of what is stored, and knows them by those of the scene.
+/// A filter that is asked with the numbers that prims have in the tree of what is stored, and asks another with those that they
+/// have in the scene.
 struct Numbered<'a, T: ?Sized> {
     instanced: &'a InstancedObjects,
     of: &'a T,

@@ -280,7 +280,7 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
     }
 
     /// Every ray that is at a leaf tests it and goes on; those that have their answer by that are returned. First all are
-    /// tested, then what was hit is looked at: nobody can foretell which, and so no test waits for another's outcome.
+    /// tested, then what was hit is looked at: which that is cannot be predicted, and so no test waits for another's outcome.
     #[inline(always)]
     fn test<S: Simd>(&self, s: S, slots: &mut Slots, mut leaves: u32, met: &mut [Met; SLOTS]) -> u32 {
         let (mut turn, mut open, mut answered) = (leaves, 0, 0);

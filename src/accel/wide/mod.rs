@@ -14,7 +14,7 @@
 //! place have common entry points, `entry_point`, and share what they see of blocks, `block_cache`), through triangles;
 //! where there is anything else, and in counted runs, they go one by one through whatever there is (`walk`). Hits are
 //! ordered by (t, prim) and every test gives an exact verdict, so that neither the order of visits nor the company of other
-//! rays can change an answer. Counts are those of one ray at a time: whoever listens gets that.
+//! rays can change an answer. Counts are those of one ray at a time.
 //!
 //! An object that stands in several places has a tree in its own frame, through which rays go one by one (`placed`).
 

@@ -101,7 +101,7 @@ struct Packet<B, const N: usize> {
 struct Found<const N: usize> {
     /// [`NO_PRIM`] where nothing was found.
     prim: [u32; N],
-    /// Where that is, block and lane, so that nobody looks up its corners again.
+    /// Where that is, block and lane, so that its corners are not looked up again.
     place: [u32; N],
 }
 

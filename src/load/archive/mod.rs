@@ -139,7 +139,7 @@ pub(super) fn is_archive(path: &Path, bytes: &[u8]) -> bool {
     begins && !is_zipped_kind(path)
 }
 
-/// The same of a file on disk.
+/// Whether a file on disk is an archive.
 fn is_archive_on_disk(path: &Path) -> io::Result<bool> {
     let (mut file, mut start) = (File::open(path)?, [0; ZIP.len()]);
     match file.read_exact(&mut start) {

@@ -146,7 +146,7 @@ impl Lattice {
     }
 }
 
-/// Spreads points over a table: they come from us, so that nobody can aim at its weak places.
+/// Hashes points for a table: they are our own, so that no attacker can aim at collisions.
 #[derive(Default)]
 struct Spread(u64);
 

@@ -148,7 +148,7 @@ impl Band {
         rows.flat_map(move |row| around(x, columns).map(move |column| row * columns + column))
     }
 
-    /// What each plot is to trace: the points that it owns and that anybody wants.
+    /// What each plot is to trace: the points that it owns and that are wanted.
     fn share(&mut self) -> Vec<Vec<Point>> {
         for i in 0..self.plots.len() {
             for point in std::mem::take(&mut self.plots[i].lattice.wanted) {

@@ -3,7 +3,7 @@
 //!
 //! Most of what rays meet in a tree are the clear parts of its leaves. Where a map is clear as far around as a lookup may read
 //! ([`Survey`]) it need not be read, and the ray need not stop there. What is not that sure is shaded, with the same outcome: a
-//! gap is passed as if it were not there, so that pictures are the same bit by bit. Whoever counts rays hears of all of them.
+//! gap is passed as if it were not there, so that pictures are the same bit by bit. Counted runs stop at all of them.
 
 mod face;
 #[cfg(test)]
@@ -53,7 +53,7 @@ pub(crate) struct AlphaVoids<'a> {
     faces: Late<Vec<Face>>,
 }
 
-/// What is found once it was asked for often enough; until then, and while somebody is at it, the others do without.
+/// What is computed once it was asked for often enough; until then, and while a thread computes it, others do without.
 #[derive(Debug)]
 struct Late<T> {
     enough: usize,

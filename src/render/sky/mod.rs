@@ -45,7 +45,7 @@ pub(crate) struct Sky {
 struct Map {
     pyramid: Pyramid,
     chance: EnvironmentDistribution,
-    /// If it has any, and somebody has asked.
+    /// If it has any, and that was asked for.
     hotspot: Option<Hotspot>,
     /// Sine and cosine of its rotation about the up axis.
     turn: (f32, f32),

@@ -191,7 +191,7 @@ impl<'a> Sampler<'a> {
             around.see(judge, pixels, &news);
             active.extend(&news);
         }
-        // Of the outermost pixels nobody knows what lies beyond.
+        // What lies beyond the outermost pixels is unknown.
         let known = self.grown(*tile, reach.saturating_sub(round + 1));
         active.retain(|&i| known.contains(pixels[i].at));
         around.judge(judge, pixels, active);

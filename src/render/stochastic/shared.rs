@@ -64,11 +64,11 @@ struct State {
 /// How far they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
-    /// Nobody has needed them yet.
+    /// They were not needed yet.
     Untouched,
-    /// Somebody traces them.
+    /// A thread traces them.
     Promised,
-    /// Somebody has traced them, or failed to.
+    /// They were traced, or that failed.
     Done,
 }
 
@@ -125,7 +125,7 @@ impl<'t> Shared<'t> {
         self.states.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The zones of a tile, if nobody traces them yet: the caller will.
+    /// The zones of a tile, if no thread traces them yet: the caller will.
     fn promise(&self, owner: usize) -> Option<Promise<'_, 't>> {
         let step = &mut self.states()[owner].step;
         (*step == Step::Untouched).then(|| {

@@ -103,7 +103,7 @@ fn pictures_have_the_same_bits_whether_or_not_rays_stop_at_what_is_not_there() {
     }
 }
 
-/// Rays that nobody counts pass some gaps, so that fewer than such a part of all are asked, and the picture is the same.
+/// Rays that are not counted pass some gaps, so that fewer than such a part of all are asked, and the picture is the same.
 fn assert_passes(job: &Job, most: f64, what: &str) -> Rendered {
     let (counted, (rendered, profile)) = (render_counted(job, &()), render_profiled(job, &()));
     assert!(rendered.picture == counted.picture, "{what}");

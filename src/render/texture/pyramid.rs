@@ -402,7 +402,7 @@ mod tests {
         let leaves = bitmap(4, 4, |x, _| if x % 2 == 0 { [255, 0, 0, 255] } else { [0, 0, 0, 0] });
         let top = top_of(&leaves, ColorSpace::SrgbCutOut);
         assert!((top - Vec4::new(1.0, 0.0, 0.0, 0.5)).abs().max_element() < 1e-4, "{top}");
-        // Elsewhere the channels have nothing to do with each other: alpha is a roughness, or nobody asks for it.
+        // Elsewhere the channels have nothing to do with each other: alpha is a roughness, or is not read.
         for space in [ColorSpace::Srgb, ColorSpace::Linear] {
             assert!((top_of(&leaves, space).x - 0.5).abs() < 1e-4, "{space:?}");
         }

@@ -42,7 +42,7 @@ pub struct World {
     /// First polygon (counted from 0) of each instance, and one past the last.
     first_polygon: Vec<u32>,
     placements: Vec<Placement>,
-    /// Whether no prim lets light pass, whether or not anybody asks each of them.
+    /// Whether no prim lets light pass, whether or not each of them is asked.
     opaque: bool,
 }
 

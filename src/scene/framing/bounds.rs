@@ -58,12 +58,12 @@ pub fn robust_bounds(scene: &Scene) -> Bounds {
     found.unwrap_or_else(|| by_parts(scene))
 }
 
-/// The same where the box of all corners is known, such as [`World::bounds`](crate::render::World::bounds).
+/// Finds the box of the model where that of all corners is known, such as [`World::bounds`](crate::render::World::bounds).
 pub fn robust_bounds_within(scene: &Scene, whole: (DVec3, DVec3)) -> Bounds {
     of_faces(scene, whole).unwrap_or_else(|| by_parts(scene))
 }
 
-/// The same of a model of faces all of whose corners are in the box `whole`; `None` for any other.
+/// The box of a model of faces all of whose corners are in the box `whole`; `None` for any other.
 fn of_faces(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
     let (lo, hi) = whole;
     if !(scene.spheres.is_empty() && scene.cones.is_empty() && lo.is_finite() && hi.is_finite()) {
@@ -78,7 +78,7 @@ fn of_faces(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
     (slices.parts() == faces(scene)).then(|| without_strays((scene, &crowd), bounds, slices))
 }
 
-/// The same for any scene.
+/// The box of the model of any scene, part by part.
 fn by_parts(scene: &Scene) -> Bounds {
     let Some(whole) = hull(scene, Anisotropy::Faces, |_| true) else {
         let unit = (DVec3::splat(-0.5), DVec3::splat(0.5));

@@ -33,7 +33,7 @@ pub fn frame(scene: &Scene, bounds: &Bounds, direction: Direction, lens: FrameLe
     fit.camera(bounds.radius())
 }
 
-/// The same for a camera that goes around the model, about the up axis through the middle of `bounds`: from everywhere on
+/// Frames the model for a camera that goes around it, about the up axis through the middle of `bounds`: from everywhere on
 /// its way all of the model is in the picture. It begins at `direction`.
 pub fn frame_around(scene: &Scene, bounds: &Bounds, direction: Direction, lens: FrameLens, aspect: f64) -> Camera {
     let mut fit = Fit::new(direction, bounds.center(), lens, aspect);
@@ -170,7 +170,7 @@ struct Extremes {
 }
 
 impl Extremes {
-    /// Those of nothing.
+    /// The extents of nothing.
     fn none(slopes: (f64, f64)) -> Self {
         let length = |slope: f64| (1.0 + slope * slope).sqrt();
         let lengths = (length(slopes.0), length(slopes.1));

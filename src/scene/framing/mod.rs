@@ -100,7 +100,7 @@ const SOLID: f64 = 0.4;
 const LANDSCAPE_ELEVATION: f64 = 38.0;
 
 impl Direction {
-    /// The same of a scene that may face back.
+    /// This direction for a scene that may face back.
     fn towards_front(self, scene: &Scene) -> Self {
         if !scene.faces_back {
             return self;
@@ -125,7 +125,7 @@ pub fn default_direction(scene: &Scene, bounds: &Bounds) -> Direction {
     by_extent(scene, bounds).towards_front(scene)
 }
 
-/// The same of a scene that does not face back.
+/// The default direction of a scene that does not face back.
 fn by_extent(scene: &Scene, bounds: &Bounds) -> Direction {
     // The model's extents in the Y-up frame.
     let extent = in_studio(scene.up, bounds.hi - bounds.lo).abs();
