@@ -269,7 +269,7 @@ fn panorama() -> Panorama {
     let mut random = Random::new(5);
     let (width, height) = (2 * PANORAMA_ROWS, PANORAMA_ROWS);
     let texels = (0..width * height).map(|_| [(); 3].map(|()| random.unit())).collect();
-    Panorama { name: String::new(), width, height, texels: Arc::new(texels), rotation: 0.0 }
+    Panorama { name: String::new(), width, height, texels: Arc::new(texels), ..Panorama::default() }
 }
 
 /// Gives all meshes normals, tangents and coordinates, and all materials maps of noise.

@@ -331,6 +331,10 @@ fn repeat_from(metadata: Option<Metadata>, picture: &Path, typed: &RenderArgs) -
     let fault = |text: String| Diagnostic::new("again", picture, "", text);
     let another = |fault: Diagnostic| fault.remedy("name a picture that meshray wrote");
     let metadata = metadata.ok_or_else(|| another(fault("was not written by meshray".into())))?;
+    if metadata.get(Metadata::VERSION).is_some() && metadata.get(Metadata::SETTINGS).is_none() {
+        let fault = fault("does not say how it was made: it is the part of a picture that --keep-partial kept, or a picture of costs or differences".into());
+        return Err(fault.remedy("name a whole picture that meshray rendered"));
+    }
     let entry =
         |key| metadata.get(key).ok_or_else(|| another(fault(format!("carries no {key}: it cannot be repeated"))));
     let settings: Map<String, Value> =
@@ -499,6 +503,16 @@ mod tests {
         let typed = parsed(words);
         let carried = with_typed(parsed("meshray render a.obj"), typed.inputs.clone(), &typed);
         assert_eq!(format!("{carried:?}"), format!("{typed:?}"));
+    }
+
+    #[test]
+    fn a_picture_of_ours_that_does_not_say_how_it_was_made_is_not_taken_for_that_of_another_program() {
+        let words = ["meshray", "render", "--again", "a.png"];
+        let Ok(Command::Render(typed)) = Cli::try_parse_from(words).map(|cli| cli.command) else { panic!() };
+        let told = |metadata| repeat_from(metadata, Path::new("a.png"), &typed).err().unwrap().to_string();
+        assert!(told(None).contains("was not written by meshray"));
+        let part = told(Some(Metadata::new()));
+        assert!(part.contains("--keep-partial") && !part.contains("wrote"), "{part}");
     }
 
     #[test]

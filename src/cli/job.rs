@@ -8,6 +8,7 @@ use super::outputs::{self, Beside, Growth, Target};
 use super::parse::Env;
 use super::sampling::SamplingArgs;
 use super::sequence::{self, Sequence, Step};
+use super::surroundings::EnvRead;
 use super::{folders, message};
 use crate::accel::{AccelChoice, AccelKind, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
@@ -122,6 +123,8 @@ pub(super) struct Look {
     pub background: Option<Background>,
     /// Around everything.
     pub env: Option<Env>,
+    /// That, once it was read.
+    pub env_read: EnvRead,
     /// How far that is turned, degrees.
     pub env_rotate: f64,
     /// Rays to it from each point.
@@ -366,6 +369,7 @@ fn look(args: &RenderArgs) -> Look {
         lens: LensChoice::new(args.fov, args.ortho),
         background: args.background,
         env: args.env.clone(),
+        env_read: EnvRead::default(),
         env_rotate: args.env_rotate.unwrap_or(0.0),
         env_rays: args.env_rays,
         gloss_rays: args.gloss_rays,

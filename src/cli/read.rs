@@ -33,9 +33,9 @@ pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded,
     Ok(whole)
 }
 
-/// What is left of the memory that may be taken after a model was loaded.
+/// What is left of the memory that may be taken beside a model that was loaded.
 pub(super) fn left(limits: &Limits, loaded: &Loaded) -> Limits {
-    let memory = limits.memory.saturating_sub(loaded.facts.charged);
+    let memory = limits.memory.saturating_sub(loaded.facts.kept);
     Limits { memory, file: limits.file.min(memory), ..*limits }
 }
 
@@ -145,7 +145,7 @@ fn append(whole: &mut Loaded, part: Loaded) {
     facts.max_rounding = facts.max_rounding.max(more.max_rounding);
     facts.files.extend(more.files);
     facts.gaps |= more.gaps;
-    facts.charged += more.charged;
+    facts.kept += more.kept;
     facts.reading += more.reading;
     facts.decoding += more.decoding;
 }
@@ -166,4 +166,44 @@ fn one(input: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
         return Err(Diagnostic::new("file-too-large", "-", "", text).remedy("raise --max-memory").into());
     }
     load_bytes(input, bytes, options)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fmt::Write;
+
+    /// Triangles of an OBJ: its text and its tables take far more than what is made of them.
+    fn model() -> String {
+        let mut text = String::new();
+        for i in 0..20_000 {
+            let _ = writeln!(text, "v {i}.000000000000 0.000000000000 {}.000000000000", i % 7);
+        }
+        for i in 1..19_998 {
+            let _ = writeln!(text, "f {i} {} {}", i + 1, i + 2);
+        }
+        text
+    }
+
+    #[test]
+    fn models_that_are_merged_take_what_they_keep_and_not_what_loading_took_for_a_while() {
+        let folder = tempfile::tempdir().unwrap();
+        let inputs: Vec<PathBuf> = ["a.obj", "b.obj", "c.obj", "d.obj"].map(|name| folder.path().join(name)).into();
+        inputs.iter().for_each(|input| std::fs::write(input, model()).unwrap());
+        let within = |inputs: &[PathBuf], memory| {
+            let limits = Limits { memory, file: memory, ..Limits::default() };
+            scene(inputs, &LoadOptions { limits, ..LoadOptions::default() })
+        };
+        // The least memory, to some kilobytes, that one of them needs.
+        let (mut less, mut enough) = (0, 1 << 30);
+        while enough - less > 4096 {
+            let middle = (less + enough) / 2;
+            if within(&inputs[..1], middle).is_ok() { enough = middle } else { less = middle }
+        }
+        let kept = within(&inputs[..1], enough).unwrap().facts.kept;
+        assert!(enough > 2 * kept, "{enough} for {kept}");
+        let all = within(&inputs, enough + 3 * kept).unwrap();
+        assert_eq!((all.facts.kept, all.scene.meshes.len()), (4 * kept, 4));
+        assert!(within(&inputs, enough + 2 * kept - 8192).is_err());
+    }
 }

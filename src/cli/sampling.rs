@@ -365,7 +365,9 @@ pub(super) fn plain(x: f32) -> f64 {
 
 /// How pixels were sampled, for programs: as [`phrase`] tells it.
 pub(super) fn json(settings: &Settings, sampled: &Sampled) -> Value {
-    let rays = json!({ "rays": sampled.rays, "mean": sampled.mean(), "most": sampled.most() });
+    let rays = json!({
+        "rays": sampled.rays, "mean": sampled.mean(), "samples_a_pixel": sampled.samples(), "most": sampled.most(),
+    });
     let mut all = match settings.sampling {
         Sampling::Uniform => json!({ "aa": "uniform" }),
         Sampling::Adaptive(how) => json!({

@@ -9,6 +9,8 @@ use crate::load::paths::FileRead;
 use crate::load::{Limits, LoadError, Loaded};
 use crate::scene::default_light::{self, DefaultLight};
 use crate::scene::{Camera, Environment, LightKind, Scene};
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 use xxhash_rust::xxh3::xxh3_128;
 
 /// Puts what `--env` names around the scene.
@@ -20,7 +22,8 @@ pub(super) fn place(look: &Look, limits: &Limits, loaded: &mut Loaded) -> Result
         None => {}
         Some(Env::BuiltIn(environment)) => loaded.scene.environment = *environment,
         Some(Env::File(file)) => {
-            let LoadedPanorama { mut panorama, warnings, hash } = panorama::load(file, &read::left(limits, loaded))?;
+            let left = read::left(limits, loaded);
+            let LoadedPanorama { mut panorama, warnings, hash } = look.env_read.panorama(file, &left)?;
             #[expect(clippy::cast_possible_truncation, reason = "an angle")]
             let rotation = (look.env_rotate % 360.0).to_radians() as f32;
             panorama.rotation = rotation;
@@ -33,6 +36,23 @@ pub(super) fn place(look: &Look, limits: &Limits, loaded: &mut Loaded) -> Result
         }
     }
     Ok(())
+}
+
+/// The panorama of `--env`, read once for all models of a command, and what a picture has prepared of it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct EnvRead(Arc<Mutex<Option<LoadedPanorama>>>);
+
+impl EnvRead {
+    /// Reads it, unless that was done already for another model that left as much memory.
+    fn panorama(&self, file: &Path, limits: &Limits) -> Result<LoadedPanorama, LoadError> {
+        // Who comes meanwhile waits: to read it twice would take longer, and twice the memory.
+        let mut read = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(read) = read.as_ref().filter(|read| read.fits(limits)) {
+            return Ok(read.clone());
+        }
+        let loaded = panorama::load(file, limits)?;
+        Ok(read.insert(loaded).clone())
+    }
 }
 
 /// Has `work` done with the scene as `camera` sees it: lit by lamps where it has none, with suns as wide as they were asked for,
@@ -70,4 +90,23 @@ fn light(look: &Look, scene: &mut Scene, camera: &Camera) -> DefaultLight {
         scene.environment = environment;
     }
     light
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panorama_is_read_once_for_all_models_that_leave_room_for_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, read) = (folder.path().join("sky.png"), EnvRead::default());
+        ::image::RgbImage::from_pixel(64, 32, ::image::Rgb([188, 90, 10])).save(&file).unwrap();
+        let limits = Limits::default();
+        let first = read.panorama(&file, &limits).unwrap();
+        std::fs::remove_file(&file).unwrap();
+        let second = read.clone().panorama(&file, &limits).unwrap();
+        assert!(Arc::ptr_eq(&first.panorama.texels, &second.panorama.texels) && first.hash == second.hash);
+        let narrow = Limits { memory: 64 * 32 * 12, ..limits };
+        assert!(read.panorama(&file, &narrow).is_err(), "what does not fit is read again, and refused");
+    }
 }

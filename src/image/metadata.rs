@@ -98,9 +98,13 @@ impl Metadata {
     }
 }
 
-/// Reads the metadata of a picture file; `None` when it is no picture, or one without ours.
+/// Reads the metadata of a picture file; `None` when it is no picture, or one without ours, and of what is no file: to open a
+/// pipe would wait for who writes into it.
 pub fn read_metadata(path: &Path) -> Result<Option<Metadata>, ImageError> {
     let read = |source| ImageError::Read { path: path.to_owned(), source };
+    if !std::fs::metadata(path).map_err(read)?.is_file() {
+        return Ok(None);
+    }
     let mut file = BufReader::new(File::open(path).map_err(read)?);
     let mut magic = Vec::new();
     file.by_ref().take(12).read_to_end(&mut magic).map_err(read)?;
@@ -201,6 +205,17 @@ mod tests {
         let empty = write(&dir, "empty.png", b"");
         assert!(!was_written_by_meshray(&empty));
         assert!(!was_written_by_meshray(&dir.path().join("missing.png")));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_is_no_picture_and_is_not_opened() {
+        let dir = tempfile::tempdir().unwrap();
+        let pipe = dir.path().join("pipe.png");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        // To open it would wait for ever.
+        assert_eq!(read_metadata(&pipe).unwrap(), None);
+        assert!(!was_written_by_meshray(&pipe));
     }
 
     /// Cuts the file at every length and spoils every byte of its head: any answer is right but a panic.

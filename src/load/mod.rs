@@ -39,7 +39,7 @@ use archive::Archive;
 use limits::{Budget, OverBudget};
 use paths::FileRead;
 
-use crate::scene::{Scene, UpAxis};
+use crate::scene::{Bitmap, Scene, UpAxis};
 use crate::stopwatch::{Spent, Stopwatch};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -169,8 +169,9 @@ pub struct Facts {
     pub hash: u128,
     /// Whether a file was looked for where it was not: in vain, or before it was found elsewhere.
     pub gaps: bool,
-    /// Bytes of memory that loading was charged with.
-    pub charged: u64,
+    /// Bytes of memory that the scene takes once it is loaded, with room for smaller copies of its pictures; loading itself takes
+    /// more for a while.
+    pub kept: u64,
     /// Time that reading the bytes of all files took, of the thread that did it.
     pub reading: Spent,
     /// Time that decoding pictures took: from the first to the last, and of all threads together.
@@ -286,9 +287,17 @@ fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadErr
     }
     let mut budget = Budget::new(&options.limits);
     let mut loaded = load_within(source, options, &mut budget)?;
-    loaded.facts.charged = options.limits.memory - budget.left();
+    loaded.facts.kept = kept(&loaded.scene);
     check_prims(&loaded.scene, &source.path)?;
     Ok(loaded)
+}
+
+/// Bytes that a scene takes once it is loaded.
+fn kept(scene: &Scene) -> u64 {
+    let pixels = |bitmap: &Bitmap| u64::from(bitmap.width) * u64::from(bitmap.height);
+    let copies: u64 = scene.bitmaps.iter().map(|bitmap| texture::smaller_copies(pixels(bitmap))).sum();
+    let around = scene.panorama.as_ref().map_or(0, |panorama| panorama.texels.len() as u64 * panorama::PER_PIXEL);
+    scene.bytes() + copies + around
 }
 
 /// Refuses a scene that shows more prims than there are numbers for: a small file can show a large mesh in many places.

@@ -16,6 +16,7 @@ use ::exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, read};
 use ::image::codecs::hdr::HdrDecoder;
 use ::image::error::DecodingError;
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Rgb, Rgb32FImage};
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::{Cursor, ErrorKind};
 use std::path::Path;
@@ -101,7 +102,7 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
     let parts = meta.map_or(1, |meta| meta.headers.len());
     warnings.extend(left_out(&source.path, parts, odd));
     let name = source.path.to_string_lossy().into_owned();
-    let panorama = Panorama { name, width, height, texels: Arc::new(texels), rotation: 0.0 };
+    let panorama = Panorama { name, width, height, texels: Arc::new(texels), ..Panorama::default() };
     Ok(LoadedPanorama { panorama, warnings, hash: xxh3_128(&source.bytes) })
 }
 
@@ -226,11 +227,11 @@ fn exposure(bytes: &[u8]) -> Option<f32> {
 /// Linear radiance of all pixels, `turned` into Rec. 709, and how many of them had to be mended. What is negative in other
 /// primaries need not be so in these.
 fn radiance(picture: DynamicImage, format: ImageFormat, turned: Option<DMat3>) -> (Vec<[f32; 3]>, usize) {
+    if !matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
+        return (linear(picture), 0);
+    }
     let picture = picture.into_rgb32f();
     let texels = picture.as_raw().as_chunks::<3>().0.iter();
-    if !matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
-        return (texels.map(|&codes| from_srgb(codes).to_array()).collect(), 0);
-    }
     let mut odd = 0;
     let mend = |texel: &[f32; 3]| {
         let usable = texel.iter().all(|c| c.is_finite() && (*c >= 0.0 || turned.is_some()));
@@ -240,6 +241,40 @@ fn radiance(picture: DynamicImage, format: ImageFormat, turned: Option<DMat3>) -
     };
     let texels = texels.map(mend).collect();
     (texels, odd)
+}
+
+/// Linear colours of a picture for screens.
+fn linear(picture: DynamicImage) -> Vec<[f32; 3]> {
+    /// The colour of each of so many codes.
+    fn table(most: u16) -> Vec<f32> {
+        (0..=most).map(|code| from_srgb([f32::from(code) / f32::from(most); 3]).x).collect()
+    }
+    let color = picture.color();
+    match color.bytes_per_pixel() / color.channel_count() {
+        1 => {
+            let (picture, table) = (picture.into_rgb8(), table(255));
+            let texels = picture.as_raw().as_chunks::<3>().0.par_iter();
+            texels.map(|codes| codes.map(|code| table[usize::from(code)])).collect()
+        }
+        2 => {
+            let (picture, table) = (picture.into_rgb16(), table(u16::MAX));
+            let texels = picture.as_raw().as_chunks::<3>().0.par_iter();
+            texels.map(|codes| codes.map(|code| table[usize::from(code)])).collect()
+        }
+        _ => {
+            let picture = picture.into_rgb32f();
+            let texels = picture.as_raw().as_chunks::<3>().0.par_iter();
+            texels.map(|&codes| from_srgb(codes).to_array()).collect()
+        }
+    }
+}
+
+impl LoadedPanorama {
+    /// Whether it could be loaded within these limits, too.
+    pub(crate) fn fits(&self, limits: &Limits) -> bool {
+        let Panorama { width, height, .. } = self.panorama;
+        memory_of((width, height), limits, Path::new(""), |_| LoadError::Input(Vec::new())).is_ok()
+    }
 }
 
 #[cfg(test)]
@@ -294,6 +329,23 @@ mod tests {
         let loaded = decode(&file(&grey, ImageFormat::Png), &Limits::default()).unwrap();
         let texel = loaded.panorama.texels[0];
         assert!((texel[0] - 0.5).abs() < 0.01 && texel[1] == 1.0 && texel[2] == 0.0);
+    }
+
+    #[test]
+    fn every_code_of_8_and_16_bits_is_the_colour_that_the_formula_gives() {
+        let narrow: Vec<u8> = (0..=255).flat_map(|code: u8| [code, 255 - code, code / 2]).collect();
+        let wide: Vec<u16> = (0..=u16::MAX).flat_map(|code| [code, u16::MAX - code, code / 3]).collect();
+        let pictures = [
+            DynamicImage::ImageRgb8(ImageBuffer::from_raw(16, 16, narrow).unwrap()),
+            DynamicImage::ImageRgb16(ImageBuffer::from_raw(256, 256, wide).unwrap()),
+            DynamicImage::ImageLuma8(ImageBuffer::from_fn(16, 16, |x, y| ::image::Luma([(16 * y + x) as u8]))),
+            DynamicImage::ImageRgba16(ImageBuffer::from_fn(2, 2, |x, y| ::image::Rgba([x as u16, 9000, y as u16, 7]))),
+        ];
+        for picture in pictures {
+            let codes = picture.to_rgb32f();
+            let expected = codes.as_raw().as_chunks::<3>().0.iter().map(|&codes| from_srgb(codes).to_array());
+            assert!(linear(picture).into_iter().eq(expected));
+        }
     }
 
     /// An EXR of even colour in other primaries, once in each part.

@@ -180,7 +180,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let points = if splits { rays.max(self.context.bands.len() as u32) } else { rays };
         let spread = self.draws(point, Purpose::Facets).spread(points);
         let mut rough = Rough { lobe, rays, spread, hotspot_sampled: HotspotSampled::default() };
-        rough.hotspot_sampled = self.ask_for_glare(point, crossing, &rough);
+        rough.hotspot_sampled = self.sample_hotspot(point, crossing, &rough);
         self.send_coat(point);
         for k in 0..rays {
             self.send_off_facet(point, crossing, &rough, k);

@@ -148,7 +148,7 @@ impl<'a> Context<'a> {
         let spreads = depth > 0 && scene.materials.iter().any(|material| gloss.spreads_far(material));
         let mut sky = Sky::new(scene).before_walls(settings.walls);
         if spreads {
-            sky.find_glare();
+            sky.find_hotspot();
         }
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
         let ways =

@@ -43,7 +43,7 @@ impl HotspotSampled {
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     /// Sends a ray to the hotspot for each that a surface spreads; of which of these that was done.
-    pub(super) fn ask_for_glare<G: ShadingPoint>(
+    pub(super) fn sample_hotspot<G: ShadingPoint>(
         &mut self,
         point: &PathVertex<G>,
         crossing: &Crossing,
@@ -58,7 +58,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let spread = self.draws(point, Purpose::Hotspot).spread(rough.rays);
         let (seen, part) = (point.surface.seen(), 1.0 / rough.rays as f32);
         for k in 0..rough.rays {
-            let Some((dir, radiance)) = context.sky.to_glare(spread.point(k)) else { continue };
+            let Some((dir, radiance)) = context.sky.to_hotspot(spread.point(k)) else { continue };
             let mirrors = seen.normal.dot(dir) > 0.0;
             if !(if mirrors { calm.mirrored } else { calm.through }) {
                 continue;

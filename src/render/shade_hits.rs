@@ -215,7 +215,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             } else if self.is_crossed(wave, i) {
                 self.continuing[class as usize].push_behind(*ray, *path, *hit);
             } else if rays.len() < FEW
-                || self.sees_glare_again(path, hit)
+                || self.sees_hotspot_again(path, hit)
                 || !sorted.take(context, (index, 1), hit.prim)
             {
                 self.shade_one(traced, i);
@@ -236,7 +236,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     /// Whether what lies behind a hit is seen by a path with hotspot that was seen without.
-    fn sees_glare_again(&self, path: &Path, hit: &Hit) -> bool {
+    fn sees_hotspot_again(&self, path: &Path, hit: &Hit) -> bool {
         path.skips_hotspot && self.context.turns(&self.context.scene.materials[self.context.face(hit.prim).1 as usize])
     }
 

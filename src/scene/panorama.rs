@@ -1,6 +1,8 @@
 //! A picture of everything around the scene.
 
-use std::sync::Arc;
+use std::any::Any;
+use std::fmt;
+use std::sync::{Arc, OnceLock};
 
 /// An equirectangular picture of what surrounds the scene, seen from its middle.
 ///
@@ -19,4 +21,30 @@ pub struct Panorama {
     pub texels: Arc<Vec<[f32; 3]>>,
     /// How far it is turned about the up axis, radians: what was along +X comes to lie towards −Z.
     pub rotation: f32,
+    /// What a renderer has made of the texels, for the next picture; clones share it.
+    pub prepared: Prepared,
+}
+
+/// Room for one value that is worth keeping beside what it is made of.
+#[derive(Clone, Default)]
+pub struct Prepared(Arc<OnceLock<Arc<dyn Any + Send + Sync>>>);
+
+impl Prepared {
+    /// What is kept, made by `make` if nothing is yet; `None` where that is of another type.
+    pub fn get_or_make<T: Send + Sync + 'static>(&self, make: impl FnOnce() -> T) -> Option<Arc<T>> {
+        Arc::clone(self.0.get_or_init(|| Arc::new(make()))).downcast().ok()
+    }
+}
+
+impl fmt::Debug for Prepared {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.debug_struct("Prepared").finish_non_exhaustive()
+    }
+}
+
+/// What is made of texels tells nothing that they do not.
+impl PartialEq for Prepared {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }

@@ -280,7 +280,7 @@ mod tests {
                 |s| {
                     let texels = Arc::new(vec![[0.0; 3]]);
                     let name = String::new();
-                    s.panorama = Some(Panorama { name, width: 0, height: 1, texels, rotation: 0.0 });
+                    s.panorama = Some(Panorama { name, width: 0, height: 1, texels, ..Panorama::default() });
                 },
                 "panorama.texels: 1 texels where 0 × 1 are 0",
             ),

@@ -45,6 +45,19 @@ fn a_name_that_is_made_up_replaces_only_a_picture_that_meshray_wrote() {
 
 #[cfg(unix)]
 #[test]
+fn a_picture_goes_into_a_pipe_by_its_name() {
+    let folder = Folder::with_cube();
+    let pipe = folder.path("cube.png");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let reader = std::thread::spawn(move || std::fs::read(pipe).unwrap());
+    folder.render(&["cube.obj", "-o", "cube.png"]).ends(0);
+    folder.render(&["cube.obj", "-o", "file.png"]).ends(0);
+    let read = reader.join().unwrap();
+    assert!(read.starts_with(b"\x89PNG") && read.len() == folder.read("file.png").len());
+}
+
+#[cfg(unix)]
+#[test]
 fn a_link_does_not_lead_a_picture_over_the_model_or_its_textures() {
     use std::os::unix::fs::symlink;
     let folder = textured_cube();

@@ -62,6 +62,7 @@ fn the_default_stops_when_it_is_certain_and_says_so() {
     let layers = picture(&folder.path("a.exr")).layers.unwrap();
     let channel = |name: &str| layers.channels.iter().find(|c| c.name == name).unwrap();
     let rays: f64 = channel("sampling.count").values.iter().sum();
+    assert!((number("samples_a_pixel") * 32.0 * 24.0 - rays).abs() < 1e-6, "{sampling}");
     assert_eq!(Some(rays), sampling["rays"].as_f64());
     assert_eq!(Some(rays), stats["counts"]["primary"]["rays"].as_f64());
     let squares: f64 = channel("sampling.error").values.iter().map(|e| e * e).sum();

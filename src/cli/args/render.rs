@@ -132,7 +132,8 @@ pub(in crate::cli) struct RenderArgs {
 
     /// #rrggbb, a colour name, r,g,b (linear, 0 to 1), `transparent`, or `env`: what reflections see, of
     /// the studio its walls
-    #[arg(long, value_name = "COLOR", value_parser = parse::background, help_heading = "Light and background")]
+    #[arg(long, value_name = "COLOR", value_parser = parse::background, help_heading = "Light and background",
+          allow_hyphen_values = true)]
     pub background: Option<Background>,
     /// What surrounds the scene and lights it: an equirectangular picture (.hdr, .exr, or one for
     /// screens), or studio, white, black

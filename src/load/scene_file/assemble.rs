@@ -2,13 +2,13 @@
 
 use super::reader::Faults;
 use super::{FORMAT, Model, Parsed, Surrounding, shapes};
+use crate::load::kept;
 use crate::load::limits::{Budget, Limits};
 use crate::load::panorama::{self, LoadedPanorama};
 use crate::load::paths::{FileFault, Resolver, shorten};
-use crate::load::texture::smaller_copies;
 use crate::load::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings, detect};
 use crate::scene::merge::Stored;
-use crate::scene::{Bitmap, Panorama, Scene, UpAxis};
+use crate::scene::{Panorama, Scene, UpAxis};
 use crate::stopwatch::Stopwatch;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -213,10 +213,4 @@ fn tell(facts: &mut Facts, found: &Facts, stretch: f64) {
         (facts.variants, facts.variant) = (found.variants.clone(), found.variant);
     }
     facts.max_rounding = facts.max_rounding.max(found.max_rounding * stretch);
-}
-
-/// Bytes that a model takes once it is read.
-fn kept(scene: &Scene) -> u64 {
-    let pixels = |bitmap: &Bitmap| u64::from(bitmap.width) * u64::from(bitmap.height);
-    scene.bytes() + scene.bitmaps.iter().map(|bitmap| smaller_copies(pixels(bitmap))).sum::<u64>()
 }

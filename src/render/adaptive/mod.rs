@@ -21,7 +21,7 @@ use super::context::Context;
 use super::frame::Frame;
 use super::observer::Observer;
 use super::sampling::Adaptive;
-use super::tile::{Tile, TilePixels};
+use super::tile::{TILE, Tile, TilePixels};
 use super::whitted::Tracer;
 use crate::accel::Accel;
 use judge::Judge;
@@ -32,6 +32,12 @@ use std::sync::Mutex;
 
 /// Tiles of a band at least, but for the last: enough for many threads.
 const BAND: usize = 64;
+
+/// Pixels of a band in a picture so wide, of which all rays are kept at a time.
+pub(crate) fn pixels_at_a_time(width: u32) -> u64 {
+    let columns = u64::from(width.div_ceil(TILE)).max(1);
+    u64::from(width) * (BAND as u64).div_ceil(columns) * u64::from(TILE)
+}
 
 /// Renders one tile for itself, with all of its border; `None` when cancelled.
 pub(super) fn render<A: Accel, P: Observer>(

@@ -159,7 +159,7 @@ mod tests {
         let grid = Level::without_texels(SIZE);
         let texels = grid.middles().map(|(_, dir)| texel(dir)).collect();
         let (width, height) = SIZE;
-        Pyramid::new(&Panorama { name: String::new(), width, height, texels: Arc::new(texels), rotation: 0.0 })
+        Pyramid::new(&Panorama { name: String::new(), width, height, texels: Arc::new(texels), ..Panorama::default() })
     }
 
     /// A gradient and a sun, 3° wide, that lights as much as all the rest.

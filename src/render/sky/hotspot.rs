@@ -67,15 +67,16 @@ impl Hotspot {
 
 impl Sky {
     /// Finds the hotspot of a picture, for surfaces that spread rays.
-    pub(crate) fn find_glare(&mut self) {
+    pub(crate) fn find_hotspot(&mut self) {
         if let Some(map) = &mut self.map {
-            map.hotspot = Hotspot::of(&map.pyramid);
+            map.seeks_hotspot = true;
+            map.hotspot();
         }
     }
 
     /// How much of the sphere hotspot covers, sr, were it even; `None`: there is none.
     pub(crate) fn hotspot(&self) -> Option<f32> {
-        self.map.as_ref().and_then(|map| map.hotspot.as_ref()).map(|hotspot| hotspot.area)
+        self.map.as_ref().and_then(|map| map.hotspot()).map(|hotspot| hotspot.area)
     }
 
     /// Whether light is worth a ray to the hotspot that adds it, where what weighs less than `cutoff` is not: beside what
@@ -83,14 +84,14 @@ impl Sky {
     pub(crate) fn is_worth_a_ray(&self, light: Vec3, cutoff: f32) -> bool {
         /// Much less than a weight, as suns are bright.
         const PART: f32 = 1.0 / 16.0;
-        let calm = self.map.as_ref().and_then(|map| map.hotspot.as_ref()).map_or(0.0, |hotspot| hotspot.calm_mean);
+        let calm = self.map.as_ref().and_then(|map| map.hotspot()).map_or(0.0, |hotspot| hotspot.calm_mean);
         light.max_element() > PART * cutoff * calm
     }
 
     /// A direction to hotspot, drawn with two numbers from 0 … 1, and its radiance over the density of drawing it.
-    pub(crate) fn to_glare(&self, at: [f32; 2]) -> Option<(Vec3, Vec3)> {
+    pub(crate) fn to_hotspot(&self, at: [f32; 2]) -> Option<(Vec3, Vec3)> {
         let map = self.map.as_ref()?;
-        let chance = &map.hotspot.as_ref()?.chance;
+        let chance = &map.hotspot()?.chance;
         let dir = chance.draw(at);
         let (radiance, density) = chance.look(dir);
         (density > 0.0).then(|| (self.to_world(map, dir), radiance / density))
@@ -98,7 +99,7 @@ impl Sky {
 
     /// Radiance along a unit direction without hotspot, averaged over a cone of this angle across (radians).
     pub(crate) fn without_hotspot(&self, dir: Vec3, angle: f32) -> Vec3 {
-        match self.map.as_ref().and_then(|map| map.hotspot.as_ref().map(|hotspot| (map, hotspot))) {
+        match self.map.as_ref().and_then(|map| map.hotspot().map(|hotspot| (map, hotspot))) {
             Some((map, hotspot)) => hotspot.without.radiance(self.to_map(map, dir), angle),
             None => self.radiance(dir, angle),
         }
@@ -123,10 +124,10 @@ mod tests {
         };
         let grid = Level::without_texels((width, height));
         let texels = Arc::new(grid.middles().map(|(_, dir)| texel(dir).to_array()).collect());
-        let panorama = Panorama { name: String::new(), width, height, texels, rotation: 0.7 };
+        let panorama = Panorama { name: String::new(), width, height, texels, rotation: 0.7, ..Panorama::default() };
         let mut sky =
             Sky::new(&Scene { environment: Environment::Panorama, panorama: Some(panorama), ..Scene::default() });
-        sky.find_glare();
+        sky.find_hotspot();
         sky
     }
 
@@ -143,7 +144,7 @@ mod tests {
         let sky = sky(3.0, 1000.0);
         let count = 20_000_u16;
         let at = |k: u16| [(f32::from(k) + 0.5) / f32::from(count), (f32::from(k) * 0.618_034).fract()];
-        let drawn = (0..count).filter_map(|k| sky.to_glare(at(k))).map(|(_, light)| light).sum::<Vec3>();
+        let drawn = (0..count).filter_map(|k| sky.to_hotspot(at(k))).map(|(_, light)| light).sum::<Vec3>();
         let drawn = drawn / f32::from(count);
         let over = |seen: &dyn Fn(Vec3) -> Vec3| -> Vec3 {
             let grid = Level::without_texels((1024, 512));
@@ -152,8 +153,9 @@ mod tests {
         let (calm, all) = (over(&|dir| sky.without_hotspot(dir, 0.0)), over(&|dir| sky.radiance(dir, 0.0)));
         assert!((drawn + calm - all).abs().max_element() < 0.01 * all.min_element(), "{drawn} + {calm} is not {all}");
         assert!(drawn.min_element() > 1.0 && calm.max_element() < 10.0, "{drawn}, {calm}");
-        let off =
-            (0..count).filter_map(|k| sky.to_glare(at(k))).map(|(dir, _)| sky.without_hotspot(dir, 0.0).max_element());
+        let off = (0..count)
+            .filter_map(|k| sky.to_hotspot(at(k)))
+            .map(|(dir, _)| sky.without_hotspot(dir, 0.0).max_element());
         assert!(off.fold(0.0, f32::max) < 1.0, "nothing of the sun is calm");
     }
 }

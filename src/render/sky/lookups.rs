@@ -134,7 +134,7 @@ mod tests {
 
     fn pyramid(width: u32, height: u32, mut texel: impl FnMut() -> [f32; 3]) -> Pyramid {
         let texels = (0..width * height).map(|_| texel()).collect();
-        Pyramid::new(&Panorama { name: String::new(), width, height, texels: Arc::new(texels), rotation: 0.0 })
+        Pyramid::new(&Panorama { name: String::new(), width, height, texels: Arc::new(texels), ..Panorama::default() })
     }
 
     struct Mean<'a>(&'a Pyramid, &'a Lookups);

@@ -16,10 +16,11 @@ use super::studio;
 use crate::image::ToneMap;
 use crate::math::Vec3;
 use crate::scene::features::is_unlit;
-use crate::scene::{Background, Environment, Scene, UpAxis};
+use crate::scene::{Background, Environment, Panorama, Scene, UpAxis};
 use distribution::EnvironmentDistribution;
 use hotspot::Hotspot;
 use panorama::Pyramid;
+use std::sync::{Arc, OnceLock};
 
 /// Angle across of cones, radians, from which the studio is blurred, little by little up to twice that: where smooth surfaces
 /// spread rays so far that they stand for much of it.
@@ -43,12 +44,42 @@ pub(crate) struct Sky {
 /// A picture of the surroundings, ready to be asked.
 #[derive(Clone, Debug)]
 struct Map {
-    pyramid: Pyramid,
-    chance: EnvironmentDistribution,
-    /// If it has any, and that was asked for.
-    hotspot: Option<Hotspot>,
+    tables: Arc<Tables>,
+    /// Whether its hotspot is told apart.
+    seeks_hotspot: bool,
     /// Sine and cosine of its rotation about the up axis.
     turn: (f32, f32),
+}
+
+/// What lookups and draws in a panorama need, however it is turned.
+#[derive(Debug)]
+struct Tables {
+    pyramid: Pyramid,
+    chance: EnvironmentDistribution,
+    /// Found when it is first asked for.
+    hotspot: OnceLock<Option<Hotspot>>,
+}
+
+impl Tables {
+    fn of(panorama: &Panorama) -> Self {
+        let pyramid = Pyramid::new(panorama);
+        let chance = EnvironmentDistribution::new(pyramid.at_most(distribution::COLUMNS).clone(), distribution::EVEN);
+        Self { pyramid, chance, hotspot: OnceLock::new() }
+    }
+
+    /// Those that an earlier picture has left with the panorama, if they are of these texels.
+    fn of_prepared(panorama: &Panorama) -> Arc<Self> {
+        let kept = panorama.prepared.get_or_make(|| Self::of(panorama));
+        kept.filter(|kept| kept.pyramid.is_of(panorama)).unwrap_or_else(|| Arc::new(Self::of(panorama)))
+    }
+}
+
+impl Map {
+    /// If it has any, and that was asked for.
+    fn hotspot(&self) -> Option<&Hotspot> {
+        let found = self.seeks_hotspot.then(|| self.tables.hotspot.get_or_init(|| Hotspot::of(&self.tables.pyramid)));
+        found.and_then(Option::as_ref)
+    }
 }
 
 impl Sky {
@@ -56,10 +87,8 @@ impl Sky {
         let backdrop = scene.background.and_then(Background::color).unwrap_or(Vec3::ZERO);
         let panorama = scene.panorama.as_ref().filter(|_| scene.environment == Environment::Panorama);
         let map = panorama.filter(|p| !p.texels.is_empty()).map(|panorama| {
-            let pyramid = Pyramid::new(panorama);
-            let chance =
-                EnvironmentDistribution::new(pyramid.at_most(distribution::COLUMNS).clone(), distribution::EVEN);
-            Map { pyramid, chance, hotspot: None, turn: libm::sincosf(panorama.rotation) }
+            let (tables, turn) = (Tables::of_prepared(panorama), libm::sincosf(panorama.rotation));
+            Map { tables, seeks_hotspot: false, turn }
         });
         let is_toned = is_unlit(scene);
         Self { environment: scene.environment, up: scene.up, backdrop, is_toned, walls: 1.0, map }
@@ -99,7 +128,7 @@ impl Sky {
                 studio::blurred(studio::from_world(self.up, dir), spread.min(1.0).sqrt())
             }
             (Environment::Studio, _) => studio::radiance(studio::from_world(self.up, dir)),
-            (Environment::Panorama, Some(map)) => map.pyramid.radiance(self.to_map(map, dir), angle),
+            (Environment::Panorama, Some(map)) => map.tables.pyramid.radiance(self.to_map(map, dir), angle),
             (Environment::Black | Environment::Panorama, _) => self.backdrop,
         }
     }
@@ -121,7 +150,7 @@ impl Sky {
     pub(crate) fn blurred(&self, dir: Vec3, roughness: f32) -> Vec3 {
         match (self.environment, &self.map) {
             (Environment::Studio, _) => studio::blurred(studio::from_world(self.up, dir), roughness),
-            (Environment::Panorama, Some(map)) => map.pyramid.blurred(self.to_map(map, dir), roughness),
+            (Environment::Panorama, Some(map)) => map.tables.pyramid.blurred(self.to_map(map, dir), roughness),
             _ => self.radiance(dir, 0.0),
         }
     }
@@ -131,7 +160,7 @@ impl Sky {
     pub(crate) fn mirrored(&self, seen: &ShadingFrame, roughness: f32) -> Vec3 {
         let exact = self.map.as_ref().and_then(|map| {
             let lobe = Lobe::even(seen.normal, roughness * roughness);
-            map.pyramid.mirrored(&lobe, seen.view, |dir| self.to_map(map, dir))
+            map.tables.pyramid.mirrored(&lobe, seen.view, |dir| self.to_map(map, dir))
         });
         exact.unwrap_or_else(|| self.blurred(seen.mirrored(), roughness))
     }
@@ -141,19 +170,21 @@ impl Sky {
         match (self.environment, &self.map) {
             (Environment::Constant(radiance), _) => radiance,
             (Environment::Studio, _) => studio::diffuse(studio::from_world(self.up, normal)),
-            (Environment::Panorama, Some(map)) => map.pyramid.diffuse(self.to_map(map, normal)),
+            (Environment::Panorama, Some(map)) => map.tables.pyramid.diffuse(self.to_map(map, normal)),
             (Environment::Black | Environment::Panorama, _) => Vec3::ZERO,
         }
     }
 
     /// A direction to look in for light, drawn with two numbers from 0 … 1; `None` where no direction is better than others.
     fn draw(&self, at: [f32; 2]) -> Option<Vec3> {
-        self.map.as_ref().map(|map| self.to_world(map, map.chance.draw(at)))
+        self.map.as_ref().map(|map| self.to_world(map, map.tables.chance.draw(at)))
     }
 
     /// Radiance as [`Self::draw`] knows it, and the density of drawing this direction, 1/sr.
     fn drawn(&self, dir: Vec3) -> (Vec3, f32) {
-        self.map.as_ref().map_or_else(|| (self.radiance(dir, 0.0), 0.0), |map| map.chance.look(self.to_map(map, dir)))
+        self.map
+            .as_ref()
+            .map_or_else(|| (self.radiance(dir, 0.0), 0.0), |map| map.tables.chance.look(self.to_map(map, dir)))
     }
 
     fn to_map(&self, map: &Map, dir: Vec3) -> Vec3 {
@@ -185,8 +216,35 @@ mod tests {
             _ => [0.0, 1.0, 0.0],
         };
         let texels = (0..128 * 256).map(|i| color(i % 256)).collect();
-        let panorama = Panorama { name: String::new(), width: 256, height: 128, texels: Arc::new(texels), rotation };
+        let panorama = Panorama {
+            name: String::new(),
+            width: 256,
+            height: 128,
+            texels: Arc::new(texels),
+            rotation,
+            ..Panorama::default()
+        };
         Sky::new(&Scene { environment: Environment::Panorama, panorama: Some(panorama), up, ..Scene::default() })
+    }
+
+    #[test]
+    fn what_was_made_of_a_panorama_serves_its_clones_however_turned_but_no_other_texels() {
+        let sky = |panorama: &Panorama| {
+            let panorama = Some(panorama.clone());
+            let mut sky = Sky::new(&Scene { environment: Environment::Panorama, panorama, ..Scene::default() });
+            sky.find_hotspot();
+            sky.map.unwrap()
+        };
+        let mut sun = vec![[0.1; 3]; 64 * 32];
+        sun[700] = [900.0; 3];
+        let panorama = Panorama { width: 64, height: 32, texels: Arc::new(sun), ..Panorama::default() };
+        let turned = Panorama { rotation: 1.0, ..panorama.clone() };
+        let (first, second) = (sky(&panorama), sky(&turned));
+        assert!(Arc::ptr_eq(&first.tables, &second.tables) && first.turn != second.turn);
+        assert!(first.hotspot().is_some());
+        let dark = Panorama { texels: Arc::new(vec![[0.1; 3]; 64 * 32]), ..panorama };
+        let other = sky(&dark);
+        assert!(!Arc::ptr_eq(&first.tables, &other.tables) && other.hotspot().is_none());
     }
 
     #[test]

@@ -41,6 +41,12 @@ impl Pyramid {
         pyramid
     }
 
+    /// Whether it was made of the texels of this panorama.
+    pub(super) fn is_of(&self, panorama: &Panorama) -> bool {
+        let Level { width, height, texels } = &self.levels[0];
+        (*width, *height) == (panorama.width, panorama.height) && Arc::ptr_eq(texels, &panorama.texels)
+    }
+
     /// For [`Self::radiance`] alone.
     pub(super) fn sharp(level: Level) -> Self {
         let nothing = Level { width: 1, height: 1, texels: Arc::new(vec![[0.0; 3]]) };
@@ -284,7 +290,7 @@ mod tests {
 
     fn pyramid(width: u32, height: u32, texel: impl Fn(u32, u32) -> [f32; 3]) -> Pyramid {
         let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
-        Pyramid::new(&Panorama { name: String::new(), width, height, texels: Arc::new(texels), rotation: 0.0 })
+        Pyramid::new(&Panorama { name: String::new(), width, height, texels: Arc::new(texels), ..Panorama::default() })
     }
 
     fn probes() -> impl Iterator<Item = Vec3> {

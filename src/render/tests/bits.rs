@@ -505,7 +505,8 @@ fn where_more_rays_wait_than_are_traced_together_points_side_by_side_have_the_sa
 fn points_that_look_around_by_rays_have_the_same_bits_side_by_side() {
     let mut random = Random::new(12);
     let texels = Arc::new((0..32 * 16).map(|_| [(); 3].map(|()| random.unit() * 2.0)).collect::<Vec<_>>());
-    let panorama = Panorama { name: String::new(), width: 32, height: 16, texels, rotation: 0.3 };
+    let panorama =
+        Panorama { name: String::new(), width: 32, height: 16, texels, rotation: 0.3, ..Panorama::default() };
     for (environment, rays) in
         [(Environment::Panorama, None), (Environment::Panorama, Some(0)), (Environment::Studio, Some(4))]
     {

@@ -27,7 +27,10 @@ fn sun() -> (Panorama, f32) {
     }
     let side = std::f32::consts::PI / 256.0;
     let irradiance = 3000.0 * 4.0 * side * side;
-    (Panorama { name: String::new(), width: 512, height: 256, texels: Arc::new(texels), rotation: 0.0 }, irradiance)
+    (
+        Panorama { name: String::new(), width: 512, height: 256, texels: Arc::new(texels), ..Panorama::default() },
+        irradiance,
+    )
 }
 
 #[test]

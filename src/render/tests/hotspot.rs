@@ -17,7 +17,7 @@ fn sun(texels: usize) -> (Panorama, f32, f32) {
     }
     let side = texels as f32 * PI / 256.0;
     let texels = Arc::new(all);
-    (Panorama { name: String::new(), width: 512, height: 256, texels, rotation: 0.0 }, RADIANCE, side * side)
+    (Panorama { name: String::new(), width: 512, height: 256, texels, ..Panorama::default() }, RADIANCE, side * side)
 }
 
 /// One pixel before such a sky, whose eye looks along ±z.
