@@ -39,7 +39,7 @@ const RAYS: usize = 4096;
 const NARROW: f32 = 0.125;
 
 const LEVELS: [&str; 2] = ["portable", "AVX2"];
-const WAYS: [(TraceMode, &str); 3] =
+const MODES: [(TraceMode, &str); 3] =
     [(TraceMode::OneByOne, "one-by-one"), (TraceMode::InFlight, "in-flight"), (TraceMode::Packets, "packets")];
 const RUNS: [&str; 2] = ["alike", "apart"];
 const QUESTIONS: [&str; 2] = ["first", "any"];
@@ -164,7 +164,7 @@ fn cases() -> Vec<Case> {
     let here = Level::all();
     let mut cases = Vec::new();
     for level in LEVELS.into_iter().filter(|level| here.iter().any(|l| l.name() == *level)) {
-        for (_, way) in WAYS {
+        for (_, way) in MODES {
             for run in RUNS {
                 for question in QUESTIONS {
                     cases.push([level, way, run, question].map(String::from));
@@ -200,7 +200,7 @@ fn trace([level, way, run, question]: [&str; 4]) -> ExitCode {
     let (vertices, triangles) = (world.shapes.vertices, world.shapes.triangles);
     let shapes = Shapes { opaque: BitSet::filled(triangles.len(), true), vertices, triangles, ..Shapes::default() };
     let (Some(level), Some(&(way, _))) =
-        (Level::all().into_iter().find(|l| l.name() == level), WAYS.iter().find(|(_, name)| *name == way))
+        (Level::all().into_iter().find(|l| l.name() == level), MODES.iter().find(|(_, name)| *name == way))
     else {
         return ExitCode::from(2);
     };

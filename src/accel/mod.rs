@@ -9,7 +9,7 @@
 //! That holds for rays and shapes within ±1e27: distances to spheres and cones that are farther away overflow on the way, in one
 //! structure sooner than in another.
 //!
-//! Rays come in waves: slices of rays in, slices of answers out. Behind the interface a structure may trace them one by
+//! Rays come in batches: slices of rays in, slices of answers out. Behind the interface a structure may trace them one by
 //! one, with many in flight, or as packets, with the same bits in the answer.
 
 pub mod any;
@@ -167,14 +167,14 @@ impl Hit {
 ///
 /// Slices of one call have equal lengths, and a scratch value comes from the structure that is asked; else a call may panic.
 pub trait Accel: Sync {
-    /// What a query writes to (stack, mailbox): one per worker, reused for every wave.
+    /// What a query writes to (stack, mailbox): one per worker, reused for every batch.
     type Scratch: Send;
 
     /// A fresh scratch value.
     fn scratch(&self) -> Self::Scratch;
 
     /// The first hit of each ray in `t_min..=t_max`, or the first there that comes after another in the order (t, prim), but for
-    /// hits with what is known to be gaps: some of these may be passed, or none. [`Hit::MISS`] where there is none.
+    /// hits that their filter rejects: some of these may be passed, or none. [`Hit::MISS`] where there is none.
     fn first_hits<P: Probe>(&self, queries: &HitQueries, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P);
 
     /// Whether anything *opaque* lies in `t_min..=t_max` of each ray: prims with a bit in [`Shapes::opaque`]. In a

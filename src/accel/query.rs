@@ -26,14 +26,14 @@ pub trait Culling: Sync {
     /// Calls [`Query::test`] at least for every bounded prim that the ray hits within [`Query::reach`].
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, scratch: &mut Self::Scratch, probe: &mut P);
 
-    /// Answers a wave, one ray after another unless a structure knows better.
-    fn trace<W: QueryBatch, P: Probe>(&self, wave: &mut W, scratch: &mut Self::Scratch, probe: &mut P) {
-        for i in 0..wave.rays().len() {
-            let (mut query, usable) = begin(self.shapes(), wave, i, probe);
+    /// Answers a batch, one ray after another unless a structure knows better.
+    fn trace<W: QueryBatch, P: Probe>(&self, batch: &mut W, scratch: &mut Self::Scratch, probe: &mut P) {
+        for i in 0..batch.rays().len() {
+            let (mut query, usable) = begin(self.shapes(), batch, i, probe);
             if usable && !query.test_planes(probe) && self.shapes().bounded() > 0 {
                 self.walk(&mut query, scratch, probe);
             }
-            end(wave, i, &query, probe);
+            end(batch, i, &query, probe);
         }
     }
 }

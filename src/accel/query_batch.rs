@@ -256,22 +256,22 @@ impl<'w, I: Intersector> QueryBatch for NextBatch<'w, I> {
     }
 }
 
-/// The query of a ray of a wave, and whether it can hit anything. [`Query::test_planes`] comes next.
+/// The query of a ray of a batch, and whether it can hit anything. [`Query::test_planes`] comes next.
 #[inline(always)]
 pub fn begin<'a, W: QueryBatch, P: Probe>(
     shapes: &'a Shapes,
-    wave: &W,
+    batch: &W,
     i: usize,
     probe: &mut P,
 ) -> (Query<'a, W::Goal>, bool) {
     probe.query();
-    Query::new(shapes, &wave.rays()[i], wave.t_min(i), wave.goal(i))
+    Query::new(shapes, &batch.rays()[i], batch.t_min(i), batch.goal(i))
 }
 
 /// Gives the answer that was found.
 #[inline(always)]
-pub fn end<W: QueryBatch, P: Probe>(wave: &mut W, i: usize, query: &Query<W::Goal>, probe: &mut P) {
-    if wave.answer(i, query) {
+pub fn end<W: QueryBatch, P: Probe>(batch: &mut W, i: usize, query: &Query<W::Goal>, probe: &mut P) {
+    if batch.answer(i, query) {
         probe.found();
     }
 }

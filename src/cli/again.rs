@@ -332,7 +332,9 @@ fn repeat_from(metadata: Option<Metadata>, picture: &Path, typed: &RenderArgs) -
     let another = |fault: Diagnostic| fault.remedy("name a picture that meshray wrote");
     let metadata = metadata.ok_or_else(|| another(fault("was not written by meshray".into())))?;
     if metadata.get(Metadata::VERSION).is_some() && metadata.get(Metadata::SETTINGS).is_none() {
-        let fault = fault("does not say how it was made: it is the part of a picture that --keep-partial kept, or a picture of costs or differences".into());
+        let text =
+            "does not say how it was made: it is what --keep-partial kept of a picture, or shows costs or differences";
+        let fault = fault(text.into());
         return Err(fault.remedy("name a whole picture that meshray rendered"));
     }
     let entry =

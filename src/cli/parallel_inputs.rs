@@ -155,7 +155,7 @@ fn spares_others(batch: &Batch) -> bool {
 /// Pictures of a scene that may be written, and how what was found out about the others ends.
 type Writable<'a> = (Vec<&'a Shot>, Exit);
 
-/// Renders the pictures of a scene; an accident ends these alone.
+/// Renders the pictures of a scene; a panic ends these alone.
 fn guarded(
     job: &RenderJob,
     batch: &Batch,

@@ -129,8 +129,12 @@ pub(super) struct Behind {
     pub counted: bool,
 }
 
-/// Bytes that each ray of adaptive sampling takes until the picture is done, at most; measured on three models.
-const ADAPTIVE_RAY: u64 = 224;
+/// Bytes that each ray of adaptive sampling takes until the picture is done, at most: what it has found, measured on three
+/// models, and what it tells layers, in lists that grow.
+fn bytes_of_ray(settings: &Settings) -> u64 {
+    224 + if settings.layers { 2 * 56 } else { 0 }
+}
+
 /// Rays that it sends through each pixel at least: a corner and a middle.
 const FEWEST_RAYS: u64 = 2;
 
@@ -152,7 +156,8 @@ fn kept_rays(how: &Adaptive, (width, height): (u32, u32)) -> u64 {
 )]
 pub(super) fn bytes_of_rays(settings: &Settings, rays: f64) -> u64 {
     let Sampling::Adaptive(how) = &settings.sampling else { return 0 };
-    (rays as u64).saturating_sub(kept_rays(how, (settings.width, settings.height))) * ADAPTIVE_RAY
+    let known = kept_rays(how, (settings.width, settings.height));
+    (rays as u64).saturating_sub(known) * bytes_of_ray(settings)
 }
 
 /// The most memory that a picture takes on its way into such a file, bytes: all that is known of its pixels, a second time
@@ -186,7 +191,7 @@ pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: Behind) -> u6
     let is_aimed = matches!(&settings.sampling, Sampling::Stochastic(how) if how.target.is_some());
     let again = if behind.counted || is_aimed { known } else { 0 };
     let of_pixels = pixels * (known + stored.max(again) + COST * behind.costs as u64);
-    of_pixels.saturating_add(rays.saturating_mul(ADAPTIVE_RAY))
+    of_pixels.saturating_add(rays.saturating_mul(bytes_of_ray(settings)))
 }
 
 /// A fault when the picture alone needs more than the memory that is allowed.
@@ -337,5 +342,13 @@ mod tests {
         assert!((2_600_000_000..4_500_000_000).contains(&of((512, 512), 3)), "{}", of((512, 512), 3));
         assert!(of((3000, 3000), 1) < 6_000_000_000, "{}", of((3000, 3000), 1));
         assert!(of((8, 8), 6) > 50 * of((8, 8), 1));
+        let with = |layers| {
+            let sampling = Sampling::Adaptive(Adaptive { min_levels: 4, ..Adaptive::default() });
+            let settings = Settings { layers, sampling, width: 256, height: 256, ..Settings::default() };
+            let known = bytes_of_rays(&settings, 0.0);
+            assert_eq!((known, bytes_of_rays(&settings, 65_536.0 * 512.0)), (0, 0), "they are known");
+            bytes_of_rays(&settings, 65_536.0 * 512.0 + 10.0)
+        };
+        assert_eq!((with(false), with(true)), (2240, 3360));
     }
 }

@@ -35,7 +35,12 @@ pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded,
 
 /// What is left of the memory that may be taken beside a model that was loaded.
 pub(super) fn left(limits: &Limits, loaded: &Loaded) -> Limits {
-    let memory = limits.memory.saturating_sub(loaded.facts.kept);
+    beside(limits, loaded.facts.kept)
+}
+
+/// What is left of the memory that may be taken beside so many bytes.
+pub(super) fn beside(limits: &Limits, bytes: u64) -> Limits {
+    let memory = limits.memory.saturating_sub(bytes);
     Limits { memory, file: limits.file.min(memory), ..*limits }
 }
 

@@ -14,7 +14,7 @@ use super::stats::{self, PictureStats};
 use super::writable::{self, Sources};
 use super::{again, empty_picture, interrupt, parallel_inputs, read, surroundings, up_to_date};
 use crate::image::destination;
-use crate::load::{Diagnostic, LoadOptions, Loaded};
+use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded};
 use crate::number::so_many;
 use crate::pages;
 use crate::render::{Moved, Sampling, World};
@@ -318,6 +318,19 @@ fn kind_of(warning: &Diagnostic) -> Kind {
     (warning.code, warning.file.clone(), warning.place.clone(), words)
 }
 
+/// Loads the inputs of a picture in the memory that the panorama of `--env` leaves, or else without that.
+fn load(job: &RenderJob, batch: &Batch, options: LoadOptions) -> Result<Loaded, LoadError> {
+    let (env, limits) = (&job.look.env_read, options.limits);
+    let kept = env.kept();
+    match read::scene(&batch.inputs, &LoadOptions { limits: read::beside(&limits, kept), ..options.clone() }) {
+        Err(error) if kept > 0 && Exit::from(&error) == Exit::Failed => {
+            env.forget();
+            read::scene(&batch.inputs, &options)
+        }
+        loaded => loaded,
+    }
+}
+
 /// Loads a scene for a picture, and refuses what cannot or must not be drawn. A frame of several may show nothing.
 fn prepare(
     task: &Task,
@@ -332,7 +345,7 @@ fn prepare(
     // Pictures are those of an earlier frame, unless other moments may show others.
     let has_pictures = earlier.as_ref().is_some_and(|earlier| !earlier.loaded.facts.changes_materials);
     let options = LoadOptions { without_pictures: has_pictures, ..options };
-    let mut loaded = read::scene(&batch.inputs, &options).map_err(|error| messages.load_error(&error))?;
+    let mut loaded = load(job, batch, options).map_err(|error| messages.load_error(&error))?;
     let (mut told, mut metered, mut load_seconds) = (HashSet::new(), Metered::default(), 0.0);
     let is_later = earlier.is_some();
     let mut with_pictures = None;

@@ -210,7 +210,7 @@ impl Prepared<'_> {
     /// Says what the picture would take, or keeps it for the file of the statistics.
     fn foretell(&self, so_far: &mut SoFar) -> Exit {
         let Task { job, messages, progress, .. } = *self.task;
-        progress.begin("queries");
+        progress.begin("looking");
         let found = crate::render::forecast(&self.work, progress);
         progress.finish();
         let Some(forecast) = found else { return Exit::Interrupted };

@@ -9,8 +9,8 @@ use crate::load::paths::FileRead;
 use crate::load::{Limits, LoadError, Loaded};
 use crate::scene::default_light::{self, DefaultLight};
 use crate::scene::{Camera, Environment, LightKind, Scene};
-use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use xxhash_rust::xxh3::xxh3_128;
 
 /// Puts what `--env` names around the scene.
@@ -40,18 +40,33 @@ pub(super) fn place(look: &Look, limits: &Limits, loaded: &mut Loaded) -> Result
 
 /// The panorama of `--env`, read once for all models of a command, and what a picture has prepared of it.
 #[derive(Clone, Debug, Default)]
-pub(super) struct EnvRead(Arc<Mutex<Option<LoadedPanorama>>>);
+pub(super) struct EnvRead(Arc<Mutex<Option<(PathBuf, LoadedPanorama)>>>);
 
 impl EnvRead {
     /// Reads it, unless that was done already for another model that left as much memory.
     fn panorama(&self, file: &Path, limits: &Limits) -> Result<LoadedPanorama, LoadError> {
-        // Who comes meanwhile waits: to read it twice would take longer, and twice the memory.
-        let mut read = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(read) = read.as_ref().filter(|read| read.fits(limits)) {
+        // Another thread that wants it waits: to read it twice would take longer, and twice the memory. Threads that wait here
+        // are those of inputs side by side, which lend none to each other's work.
+        let mut read = self.read();
+        if let Some((_, read)) = read.as_ref().filter(|(of, read)| of == file && read.fits(limits)) {
             return Ok(read.clone());
         }
         let loaded = panorama::load(file, limits)?;
-        Ok(read.insert(loaded).clone())
+        Ok(read.insert((file.to_owned(), loaded)).1.clone())
+    }
+
+    /// Bytes of memory that it takes.
+    pub(super) fn kept(&self) -> u64 {
+        self.read().as_ref().map_or(0, |(_, read)| read.bytes())
+    }
+
+    /// Gives that memory back: it is read again when it is wanted.
+    pub(super) fn forget(&self) {
+        *self.read() = None;
+    }
+
+    fn read(&self) -> MutexGuard<'_, Option<(PathBuf, LoadedPanorama)>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -106,7 +121,15 @@ mod tests {
         std::fs::remove_file(&file).unwrap();
         let second = read.clone().panorama(&file, &limits).unwrap();
         assert!(Arc::ptr_eq(&first.panorama.texels, &second.panorama.texels) && first.hash == second.hash);
-        let narrow = Limits { memory: 64 * 32 * 12, ..limits };
-        assert!(read.panorama(&file, &narrow).is_err(), "what does not fit is read again, and refused");
+        assert_eq!(read.kept(), 64 * 32 * panorama::PER_PIXEL);
+        let other = folder.path().join("other.png");
+        ::image::RgbImage::from_pixel(4, 2, ::image::Rgb([1, 2, 3])).save(&other).unwrap();
+        let third = read.panorama(&other, &limits).unwrap();
+        assert_eq!((third.panorama.width, read.kept()), (4, 8 * panorama::PER_PIXEL), "another file");
+        let narrow = Limits { memory: 8 * panorama::PER_PIXEL - 1, ..limits };
+        let told = read.panorama(&other, &narrow).unwrap_err().to_string();
+        assert!(told.contains("raise --max-memory"), "what does not fit is read again, and refused: {told}");
+        read.forget();
+        assert_eq!(read.kept(), 0);
     }
 }

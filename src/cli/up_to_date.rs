@@ -73,7 +73,8 @@ pub(super) fn is_as_loaded(job: &RenderJob, batch: &Batch, shot: &Shot, loaded: 
 
 /// What the picture that is there says it was made of.
 fn carried(shot: &Shot) -> Option<String> {
-    let metadata = read_metadata(shot.target.path()?).ok().flatten()?;
+    let picture = shot.target.path().filter(|path| path.is_file())?;
+    let metadata = read_metadata(picture).ok().flatten()?;
     metadata.get(Metadata::MADE_OF).map(str::to_owned)
 }
 

@@ -36,7 +36,7 @@ impl Finder<'_> {
         Ok(Found { bytes: self.resolver.read_file(&path)?, path, guessed })
     }
 
-    /// Finds `name`, queries in `folders` (relative to the model's), first as written, then in any case, then without its
+    /// Finds `name`, looking in `folders` (relative to the model's), first as written, then in any case, then without its
     /// first folders, as written and in any case, then in folders that pictures are in, at last as a picture of another kind.
     /// The fault is that of the name as written.
     pub(super) fn find(&mut self, name: &str, folders: &[&Path]) -> Result<Place, FileFault> {

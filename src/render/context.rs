@@ -30,7 +30,7 @@ const ENV_RAYS: u32 = 16;
 /// Shadow rays that wait before they are traced, and …
 pub(super) const SHADOW_LIMIT: usize = 1 << 14;
 /// … rays to the surroundings.
-pub(super) const AROUND_LIMIT: usize = 1 << 15;
+pub(super) const ENVIRONMENT_RAYS_LIMIT: usize = 1 << 15;
 /// Rays behind those of eyes that wait before they are traced.
 pub(super) const FOLLOWERS: usize = 1 << 17;
 
@@ -151,8 +151,11 @@ impl<'a> Context<'a> {
             sky.find_hotspot();
         }
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
-        let ways =
-            ways_around(sky.is_map(), features.has(Feature::DiffuseTransmission), features.has(Feature::MetalRough));
+        let ways = environment_ways(
+            sky.is_map(),
+            features.has(Feature::DiffuseTransmission),
+            features.has(Feature::MetalRough),
+        );
         let env_rays = shared_env_rays(env_rays, together, ways);
         let lights: Vec<LocalLight> = scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect();
         let light_rays = settings.light_rays.max(1).div_ceil(together);
@@ -203,7 +206,7 @@ impl<'a> Context<'a> {
     ) -> Option<AlphaFilter<'r, 'a>> {
         let each = 2 * self.gloss.rays as usize + self.bands.len() + 2;
         let in_order = self.depth == 0 || class == RayClass::Primary && samples.saturating_mul(each) < FOLLOWERS;
-        let alpha_voids = self.alpha_voids.as_ref().filter(|_| P::PASSES_GAPS && in_order)?;
+        let alpha_voids = self.alpha_voids.as_ref().filter(|_| P::FILTERS_ALPHA && in_order)?;
         Some(alpha_voids.before(rays, cones))
     }
 
@@ -218,7 +221,7 @@ impl<'a> Context<'a> {
         Self { seed: settings.seed, highlight_reach, gloss, ahead: None, ..self.clone() }
     }
 
-    /// Whether rays to hotspot end at this material: rays that pass it may go on another way, or many, and leave some light
+    /// Whether rays to the hotspot end at this material: rays that pass it may go on another way, or many, and leave some light
     /// behind by the angle at which they meet it.
     pub(super) fn turns(&self, material: &Material) -> bool {
         material.reflection.transmits()
@@ -256,7 +259,7 @@ impl<'a> Context<'a> {
 
 /// Ways in which directions to the surroundings are drawn, which are a panorama or not, from surfaces of which some are
 /// translucent or not, and rough mirrors or not.
-fn ways_around(to_panorama: bool, translucent: bool, glossy: bool) -> u32 {
+fn environment_ways(to_panorama: bool, translucent: bool, glossy: bool) -> u32 {
     // To each side. What a lobe gathers is met in it alone, and so is the sun of a panorama by its own light.
     1 + u32::from(translucent) + if to_panorama { 2 } else { u32::from(glossy) }
 }
@@ -271,7 +274,7 @@ fn shared_env_rays(rays: u32, together: u32, ways: u32) -> u32 {
 fn points_at_a_time(lights: &[LocalLight], light_rays: u32, env_rays: u32, gloss: Gloss) -> usize {
     let rays = |light: &LocalLight| if light.is_area() { light_rays as usize } else { 1 };
     let to_lights: usize = lights.iter().filter(|light| light.shadows).map(rays).sum();
-    let points = (SHADOW_LIMIT / to_lights.max(1)).min(AROUND_LIMIT / (env_rays as usize).max(1));
+    let points = (SHADOW_LIMIT / to_lights.max(1)).min(ENVIRONMENT_RAYS_LIMIT / (env_rays as usize).max(1));
     let points = points.min(FOLLOWERS / (gloss.rays as usize).max(1));
     points.max(1).next_multiple_of(LANES)
 }
@@ -339,7 +342,7 @@ mod tests {
                 (false, true, false),
                 (true, true, true),
             ]
-            .map(|(map, thin, glossy)| shared_env_rays(rays, together, ways_around(map, thin, glossy)))
+            .map(|(map, thin, glossy)| shared_env_rays(rays, together, environment_ways(map, thin, glossy)))
         };
         assert_eq!(shared(0, 4), [0; 5]);
         assert_eq!(shared(1, 1), [2, 4, 6, 4, 8]);

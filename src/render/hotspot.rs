@@ -17,7 +17,7 @@ use super::whitted::Tracer;
 use crate::accel::Accel;
 use crate::math::Vec3;
 
-/// Of which rays that a surface spreads the hotspot was asked for itself.
+/// Of which rays that a surface spreads the hotspot was sampled by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct HotspotSampled {
     pub mirrored: bool,
@@ -50,9 +50,9 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         rough: &Rough,
     ) -> HotspotSampled {
         let context = self.context;
-        let calm = HotspotSampled::of(context, point, crossing, &rough.lobe);
+        let sampled = HotspotSampled::of(context, point, crossing, &rough.lobe);
         // Where colours are bent apart each has facets of its own.
-        if calm == HotspotSampled::default() || self.splits(point) {
+        if sampled == HotspotSampled::default() || self.splits(point) {
             return HotspotSampled::default();
         }
         let spread = self.draws(point, Purpose::Hotspot).spread(rough.rays);
@@ -60,7 +60,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         for k in 0..rough.rays {
             let Some((dir, radiance)) = context.sky.to_hotspot(spread.point(k)) else { continue };
             let mirrors = seen.normal.dot(dir) > 0.0;
-            if !(if mirrors { calm.mirrored } else { calm.through }) {
+            if !(if mirrors { sampled.mirrored } else { sampled.through }) {
                 continue;
             }
             let shown = if mirrors {
@@ -82,7 +82,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
                 self.hotspots.push_unbent(ray, left, light, media);
             }
         }
-        calm
+        sampled
     }
 }
 

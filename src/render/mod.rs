@@ -4,7 +4,7 @@
 //! `wave`): eye rays, then the shadow rays of what they hit (`shadow`), then reflected and refracted rays,
 //! generation by generation. A hit becomes a `surface` once, its material is evaluated in `shade`, and [`optics`]
 //! says where light goes from there. Points of opaque surfaces need no more than formulas, which are computed for many of
-//! them side by side (`beside`, `batch`).
+//! them side by side (`shade_hits`, `shading_batch`).
 //!
 //! The pixels are the same bits for every structure and every number of threads: structures give equal hits, sums run
 //! in a fixed order within a tile, and transcendental functions are the crate's own.

@@ -3,9 +3,9 @@
 //! The picture stays what it is, bit for bit; what leaving things out saves is the difference in time. Done in vain are:
 //!
 //! - for each shadow ray: no prim counts as opaque, so that none ends the ray, and each that it meets is asked what it lets
-//!   through ([`World::without_pruning`](super::World::with_everything));
+//!   through ([`World::without_pruning`](super::World::without_pruning));
 //! - at each point: the lookup of every map that its material lacks, in a map of the program's own
-//!   ([`TextureStore::without_pruning`](super::texture::TextureStore::with_everything)), with normal and bump mapping;
+//!   ([`TextureStore::without_pruning`](super::texture::TextureStore::without_pruning)), with normal and bump mapping;
 //! - at each point: what is absorbed on the way to it, by materials that absorb nothing;
 //! - at each point where rays end: the weights of what is reflected and refracted, and its spectrum.
 //!

@@ -26,7 +26,7 @@ pub(crate) trait Observer: Probe {
     const SLICE: usize = 256;
 
     /// Whether rays may pass known gaps without telling: where queries are neither counted nor recorded.
-    const PASSES_GAPS: bool = false;
+    const FILTERS_ALPHA: bool = false;
 
     /// These rays are asked now; `after` has the hit of each behind which it goes on, where that is the question.
     fn asked(&mut self, _question: Question, _rays: &[Ray], _after: &[Hit]) {}
@@ -37,7 +37,7 @@ pub(crate) trait Observer: Probe {
 }
 
 impl Observer for NoProbe {
-    const PASSES_GAPS: bool = true;
+    const FILTERS_ALPHA: bool = true;
 }
 
 impl Observer for RayCounts {}

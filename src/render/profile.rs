@@ -81,7 +81,7 @@ impl Probe for Clock {
 }
 
 impl Observer for Clock {
-    const PASSES_GAPS: bool = true;
+    const FILTERS_ALPHA: bool = true;
 
     fn asked(&mut self, _question: Question, rays: &[Ray], _after: &[Hit]) {
         self.rays += rays.len() as u64;

@@ -92,7 +92,7 @@ impl<'a> TracedRays<'a> {
 #[derive(Default)]
 pub(super) struct ShadingBuffers {
     /// Both are large: there is always one of each, but while it is at work.
-    sorted: Option<HitsByInstance>,
+    by_instance: Option<HitsByInstance>,
     batch: Option<Box<ShadingBatch>>,
     /// Rays that met nothing and see the surroundings.
     missed: Vec<u32>,
@@ -154,38 +154,38 @@ impl Ranks {
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     /// Adds what eye rays see.
-    pub(super) fn shade_eyes(&mut self, eyes: &PrimaryRays) {
+    pub(super) fn shade_primary_rays(&mut self, eyes: &PrimaryRays) {
         let at_a_time = self.context.points_at_a_time;
         for (start, hits) in (0..).step_by(at_a_time).zip(eyes.hits.chunks(at_a_time)) {
-            self.shade_some_eyes(eyes, (start, hits));
+            self.shade_some_primary_rays(eyes, (start, hits));
             self.relieve();
-            self.follow_eyes();
+            self.trace_followers();
         }
     }
 
     /// Adds what some eye rays see whose hits follow each other.
-    fn shade_some_eyes(&mut self, eyes: &PrimaryRays, (first, hits): (u32, &[Hit])) {
+    fn shade_some_primary_rays(&mut self, eyes: &PrimaryRays, (first, hits): (u32, &[Hit])) {
         let context = self.context;
-        let mut sorted = self.sort();
+        let mut by_instance = self.sort();
         for (start, eight) in (first..).step_by(LANES).zip(hits.chunks(LANES)) {
             // Neighbours mostly hit the same.
             let first = eight[0].prim;
             let alike = eight.iter().all(|hit| hit.prim == first);
-            if !(alike && eight[0].is_some() && sorted.take(context, (start, eight.len()), first)) {
-                (start..).zip(eight).for_each(|(i, hit)| self.shade_eye(eyes, &mut sorted, i, hit));
+            if !(alike && eight[0].is_some() && by_instance.take(context, (start, eight.len()), first)) {
+                (start..).zip(eight).for_each(|(i, hit)| self.shade_primary_ray(eyes, &mut by_instance, i, hit));
             }
         }
         self.see_surroundings(TracedRays::PrimaryRays(eyes));
-        self.shade_sorted(TracedRays::PrimaryRays(eyes), sorted);
+        self.shade_by_instance(TracedRays::PrimaryRays(eyes), by_instance);
     }
 
-    fn shade_eye(&mut self, eyes: &PrimaryRays, sorted: &mut HitsByInstance, i: u32, hit: &Hit) {
+    fn shade_primary_ray(&mut self, eyes: &PrimaryRays, by_instance: &mut HitsByInstance, i: u32, hit: &Hit) {
         if hit.is_some() {
-            if !sorted.take(self.context, (i, 1), hit.prim) {
+            if !by_instance.take(self.context, (i, 1), hit.prim) {
                 self.shade_one(TracedRays::PrimaryRays(eyes), i as usize);
             }
         } else if self.context.shows_environment {
-            self.beside.missed.push(i);
+            self.buffers.missed.push(i);
         } else {
             self.samples[i as usize].through += Vec3::ONE;
         }
@@ -193,36 +193,40 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
 
     /// Adds what the rays of a wave see.
     pub(super) fn shade_wave(&mut self, class: RayClass, wave: &Wave) {
-        let mut ranks = std::mem::take(&mut self.beside.ranks);
+        let mut ranks = std::mem::take(&mut self.buffers.ranks);
         ranks.rank(&wave.rays);
         for rays in ranks.iter().flat_map(|rays| rays.chunks(self.context.points_at_a_time)) {
             self.shade_some((class, wave), rays);
             self.relieve();
         }
-        self.beside.ranks = ranks;
+        self.buffers.ranks = ranks;
     }
 
     /// Adds what these rays of a wave see, which belong to different samples.
     fn shade_some(&mut self, (class, wave): (RayClass, &Wave), rays: &[u32]) {
         let context = self.context;
         let traced = TracedRays::Wave(class, wave);
-        let mut sorted = self.sort();
+        let mut by_instance = self.sort();
         for &index in rays {
             let i = index as usize;
             let (ray, path, hit) = (&wave.rays[i], &wave.paths[i], &wave.hits[i]);
             if !hit.is_some() {
-                if path.straight || path.skips_hotspot { self.leave(ray, path) } else { self.beside.missed.push(index) }
+                if path.straight || path.skips_hotspot {
+                    self.leave(ray, path)
+                } else {
+                    self.buffers.missed.push(index)
+                }
             } else if self.is_crossed(wave, i) {
                 self.continuing[class as usize].push_behind(*ray, *path, *hit);
             } else if rays.len() < FEW
                 || self.sees_hotspot_again(path, hit)
-                || !sorted.take(context, (index, 1), hit.prim)
+                || !by_instance.take(context, (index, 1), hit.prim)
             {
                 self.shade_one(traced, i);
             }
         }
         self.see_surroundings(traced);
-        self.shade_sorted(traced, sorted);
+        self.shade_by_instance(traced, by_instance);
     }
 
     /// Whether the `i`th ray has crossed already what it has hit.
@@ -235,7 +239,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// Whether what lies behind a hit is seen by a path with hotspot that was seen without.
+    /// Whether what lies behind a hit shows the hotspot to a path that has seen none so far.
     fn sees_hotspot_again(&self, path: &Path, hit: &Hit) -> bool {
         path.skips_hotspot && self.context.turns(&self.context.scene.materials[self.context.face(hit.prim).1 as usize])
     }
@@ -248,14 +252,14 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     fn sort(&mut self) -> HitsByInstance {
-        let mut sorted = self.beside.sorted.take().unwrap_or_default();
-        sorted.clear(self.context.scene.instances.len());
-        sorted
+        let mut by_instance = self.buffers.by_instance.take().unwrap_or_default();
+        by_instance.clear(self.context.scene.instances.len());
+        by_instance
     }
 
     /// Adds what rays that met nothing see.
     fn see_surroundings(&mut self, traced: TracedRays) {
-        let mut missed = std::mem::take(&mut self.beside.missed);
+        let mut missed = std::mem::take(&mut self.buffers.missed);
         match traced {
             TracedRays::PrimaryRays(eyes) => {
                 let samples = &mut self.samples;
@@ -271,31 +275,31 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             }
         }
         missed.clear();
-        self.beside.missed = missed;
+        self.buffers.missed = missed;
     }
 
     /// Shades the points that were taken, and gives the buffers back.
-    fn shade_sorted(&mut self, traced: TracedRays, sorted: HitsByInstance) {
-        let mut batch = self.beside.batch.take().unwrap_or_default();
-        for k in 0..sorted.instances() {
-            let (instance, hits) = sorted.of(k);
+    fn shade_by_instance(&mut self, traced: TracedRays, by_instance: HitsByInstance) {
+        let mut batch = self.buffers.batch.take().unwrap_or_default();
+        for k in 0..by_instance.instances() {
+            let (instance, hits) = by_instance.of(k);
             for hits in hits.chunks(POINTS) {
                 if hits.len() < FEW {
                     hits.iter().for_each(|&(ray, _)| self.shade_one(traced, ray as usize));
                 } else {
-                    self.shade_batch(traced, &sorted, (instance, hits), &mut batch);
+                    self.shade_batch(traced, &by_instance, (instance, hits), &mut batch);
                 }
             }
         }
-        self.beside.batch = Some(batch);
-        self.beside.sorted = Some(sorted);
+        self.buffers.batch = Some(batch);
+        self.buffers.by_instance = Some(by_instance);
     }
 
     /// Shades points of one instance side by side, as [`Self::shade`] does one by one.
     fn shade_batch(
         &mut self,
         traced: TracedRays,
-        sorted: &HitsByInstance,
+        by_instance: &HitsByInstance,
         (instance, hits): (u32, &[(u32, u32)]),
         batch: &mut ShadingBatch,
     ) {
@@ -304,7 +308,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let Some(common) = &context.common[mesh.material as usize] else { return };
         let (smooth, reads) = (!mesh.normals.is_empty(), common.mapped || !mesh.colors.is_empty());
         let (bsdf, shiny, placement) = (&common.bsdf, common.shiny, context.world.placement(instance));
-        batch.take(hits, sorted, (traced, &context.absorption), smooth);
+        batch.take(hits, by_instance, (traced, &context.absorption), smooth);
         batch.find(smooth.then_some(placement));
         if reads || shiny || context.looks_around_by_points() {
             batch.widen(traced);
@@ -390,7 +394,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let absorbs = context.absorption.is_some();
         let within = absorbs && batch.certain().any(|i| traced.path(batch.arrival(i).0).media.innermost().is_some());
         let what = (bsdf, common.shiny, has_inside);
-        let mut draws = std::mem::take(&mut self.beside.draws);
+        let mut draws = std::mem::take(&mut self.buffers.draws);
         draws.clear();
         for (number, light) in (0..).zip(&context.lights) {
             if !light.is_area() {
@@ -408,7 +412,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
                 self.ask_for(traced, light, batch, (within, Some(place)));
             }
         }
-        self.beside.draws = draws;
+        self.buffers.draws = draws;
     }
 
     /// Leaves out points to which a light brings little, by chance.

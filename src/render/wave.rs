@@ -75,7 +75,7 @@ impl Path {
         }
     }
 
-    /// The same behind the back of a one-sided face, which no ray sees, but which is in the way of those to hotspot.
+    /// The same behind the back of a one-sided face, which no ray sees, but which is in the way of those to the hotspot.
     pub(crate) fn behind_back(self) -> Self {
         Self { skips_hotspot: false, ..self }
     }

@@ -12,7 +12,7 @@ use super::alpha_voids::Cones;
 use super::asking::Asking;
 use super::branch::{PathVertex, ShadingPoint};
 use super::by_class::ByClass;
-use super::context::{AROUND_LIMIT, Context, FOLLOWERS, SHADOW_LIMIT};
+use super::context::{Context, ENVIRONMENT_RAYS_LIMIT, FOLLOWERS, SHADOW_LIMIT};
 use super::draws::{Draws, Purpose, Stream};
 use super::glint;
 use super::layers::FirstSurface;
@@ -58,7 +58,7 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     /// Rays that go on behind a hit, by class.
     pub(super) continuing: [Queue; 3],
     wave: Wave,
-    pub(super) beside: ShadingBuffers,
+    pub(super) buffers: ShadingBuffers,
     pub(super) shadows: ShadowQueue,
     /// Rays to the hotspot of the sky.
     pub(super) hotspots: ShadowQueue,
@@ -92,7 +92,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             starting: Default::default(),
             continuing: Default::default(),
             wave: Wave::default(),
-            beside: ShadingBuffers::default(),
+            buffers: ShadingBuffers::default(),
             shadows: ShadowQueue::default(),
             hotspots: ShadowQueue::default(),
             environment_rays: EnvironmentRays::default(),
@@ -135,13 +135,13 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
 
     /// Traces all trees to their leaves; false when the user gave up before the end.
     pub(crate) fn trace(&mut self) -> bool {
-        self.trace_eyes();
+        self.trace_primary_rays();
         self.trace_waves();
         !self.asking.cancelled
     }
 
     /// Traces what follows eye rays, once so much waits that memory would fill.
-    pub(super) fn follow_eyes(&mut self) {
+    pub(super) fn trace_followers(&mut self) {
         if self.starting.iter().chain(&self.continuing).map(Queue::len).sum::<usize>() >= FOLLOWERS {
             self.trace_shadows();
             self.trace_waves();
@@ -162,7 +162,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Traces the rays of all eyes and shades what they hit.
-    fn trace_eyes(&mut self) {
+    fn trace_primary_rays(&mut self) {
         let mut eyes = std::mem::take(&mut self.eyes);
         {
             let PrimaryQuery { rays, pencil, cones, hits } = eyes.ask();
@@ -173,7 +173,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             self.asking.first_hits(&queries, hits, self.counts.of(RayClass::Primary));
         }
         if !self.asking.cancelled {
-            self.shade_eyes(&eyes);
+            self.shade_primary_rays(&eyes);
             self.trace_shadows();
         }
         self.eyes = eyes;
@@ -223,7 +223,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     pub(super) fn relieve(&mut self) {
         if self.shadows.len() >= SHADOW_LIMIT
             || self.hotspots.len() >= SHADOW_LIMIT
-            || self.environment_rays.len() >= AROUND_LIMIT
+            || self.environment_rays.len() >= ENVIRONMENT_RAYS_LIMIT
         {
             self.trace_shadows();
         }
@@ -252,7 +252,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let (before, path) = (path, lessened.as_ref().unwrap_or(path));
         let target = HitPrim::new(context.scene, context.world, hit.prim);
         let material = target.material;
-        // Rays to hotspot end at what would turn them.
+        // Rays to the hotspot end at what would turn them.
         let seeing = path.skips_hotspot && context.turns(material);
         let seeing = seeing.then(|| [before, path].map(|path| Path { skips_hotspot: false, ..*path }));
         let (before, path) = seeing.as_ref().map_or((before, path), |[before, path]| (before, path));
@@ -276,7 +276,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         // Local colour: emitted, from everywhere, from each light.
         surface.shade_smoothly(context.textures);
         self.note(ray, path, &surface, base.truncate());
-        let bsdf = matter_seen(context, &surface, base.truncate(), path);
+        let bsdf = bsdf_seen(context, &surface, base.truncate(), path);
         let point = PathVertex {
             ray,
             hit,
@@ -417,7 +417,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
 }
 
 /// What a surface of this base colour is made of, as a ray of a path sees it.
-fn matter_seen(context: &Context, surface: &Surface, base: Vec3, path: &Path) -> Bsdf {
+fn bsdf_seen(context: &Context, surface: &Surface, base: Vec3, path: &Path) -> Bsdf {
     let material = surface.target.material;
     let mut bsdf = Bsdf::new(surface, base, context.textures);
     if path.scattered > SPREAD {

@@ -75,7 +75,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Bytes of its lists, of the arrays of its meshes and of its pictures.
+    /// Bytes of its lists, of the names in them, of the arrays of its meshes and of its pictures.
     pub fn bytes(&self) -> u64 {
         let lists = self.meshes.len() * size_of::<Mesh>()
             + self.instances.len() * size_of::<Instance>()
@@ -85,10 +85,20 @@ impl Scene {
             + self.materials.len() * size_of::<Material>()
             + self.textures.len() * size_of::<Texture>()
             + self.bitmaps.len() * size_of::<Bitmap>()
-            + self.lights.len() * size_of::<Light>();
+            + self.lights.len() * size_of::<Light>()
+            + self.cameras.len() * size_of::<Camera>();
+        let names = self.meshes.iter().map(|it| it.name.len()).sum::<usize>()
+            + self.instances.iter().map(|it| it.name.len()).sum::<usize>()
+            + self.spheres.iter().map(|it| it.name.len()).sum::<usize>()
+            + self.cones.iter().map(|it| it.name.len()).sum::<usize>()
+            + self.planes.iter().map(|it| it.name.len()).sum::<usize>()
+            + self.materials.iter().map(|it| it.name.len()).sum::<usize>()
+            + self.bitmaps.iter().map(|it| it.name.len()).sum::<usize>()
+            + self.lights.iter().map(|it| it.name.len()).sum::<usize>()
+            + self.cameras.iter().map(|it| it.name.len()).sum::<usize>();
         let meshes: u64 = self.meshes.iter().map(Mesh::bytes).sum();
         let bitmaps: u64 = self.bitmaps.iter().map(Bitmap::bytes).sum();
-        lists as u64 + meshes + bitmaps
+        (lists + names) as u64 + meshes + bitmaps
     }
 }
 

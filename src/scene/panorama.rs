@@ -31,8 +31,18 @@ pub struct Prepared(Arc<OnceLock<Arc<dyn Any + Send + Sync>>>);
 
 impl Prepared {
     /// What is kept, made by `make` if nothing is yet; `None` where that is of another type.
+    ///
+    /// Threads that ask at once may each make it, and one of these values is kept: none waits for another, which could be at work
+    /// for the one that waits.
     pub fn get_or_make<T: Send + Sync + 'static>(&self, make: impl FnOnce() -> T) -> Option<Arc<T>> {
-        Arc::clone(self.0.get_or_init(|| Arc::new(make()))).downcast().ok()
+        let kept = match self.0.get() {
+            Some(kept) => Arc::clone(kept),
+            None => {
+                let made: Arc<dyn Any + Send + Sync> = Arc::new(make());
+                Arc::clone(self.0.get_or_init(|| made))
+            }
+        };
+        kept.downcast().ok()
     }
 }
 

@@ -53,7 +53,7 @@ fn a_picture_goes_into_a_pipe_by_its_name() {
     folder.render(&["cube.obj", "-o", "cube.png"]).ends(0);
     folder.render(&["cube.obj", "-o", "file.png"]).ends(0);
     let read = reader.join().unwrap();
-    assert!(read.starts_with(b"\x89PNG") && read.len() == folder.read("file.png").len());
+    assert!(read.starts_with(b"\x89PNG") && read == folder.read("file.png"));
 }
 
 #[cfg(unix)]
@@ -268,13 +268,18 @@ fn a_model_that_takes_more_memory_than_is_allowed_ends_in_1_as_more_may_help() {
 
 #[test]
 fn models_in_one_scene_share_the_memory_that_is_allowed() {
-    let folder = Folder::new().file("cube.obj", format!("{CUBE}{}", "#\n".repeat(100_000)));
-    let render = |times: usize| {
+    let points: String = (0..5000).map(|i| format!("v {i} {} 0\n", i % 7)).collect();
+    let faces: String = (1..4999).map(|i| format!("f {i} {} {}\n", i + 1, i + 2)).collect();
+    let folder =
+        Folder::new().file("cube.obj", format!("{CUBE}{}", "#\n".repeat(100_000))).file("mesh.obj", points + &faces);
+    let render = |model: &str, times: usize| {
         let merged = ["--merge", "--dry-run", "--max-memory", "5M"];
-        folder.render(&[&vec!["cube.obj"; times][..], &merged].concat())
+        folder.render(&[&vec![model; times][..], &merged].concat())
     };
-    render(2).ends(0);
-    render(40).ends(1).says(&["cube.obj", "--max-memory"]);
+    // The text of one is gone before that of the next.
+    render("cube.obj", 40).ends(0);
+    render("mesh.obj", 2).ends(0);
+    render("mesh.obj", 60).ends(1).says(&["mesh.obj", "--max-memory"]);
 }
 
 #[test]

@@ -8,6 +8,7 @@
 //! `MESHRAY_RECORD=1 cargo test --test main golden` stores what is rendered now, and fails: look at the pictures, then
 //! run again without it.
 
+mod lobes;
 mod pictures;
 pub mod sheet;
 

@@ -19,7 +19,7 @@ use crate::math::triangles::{Corners8, corners_of};
 /// What a ray looks for, and what it has found.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seeker {
-    /// Its number in the wave.
+    /// Its number in the batch.
     pub number: usize,
     /// Boxes are entered up to here.
     pub limit: f32,
@@ -97,7 +97,7 @@ impl TriangleSlot {
 }
 
 impl Seeker {
-    /// A ray that was made ready, whose hits count from `t_min` on, of this number in its wave.
+    /// A ray that was made ready, whose hits count from `t_min` on, of this number in its batch.
     #[inline(always)]
     pub(super) fn new(ray: &PreparedRay, t_min: f32, number: usize, exclude: u32) -> Self {
         Self {
@@ -123,7 +123,7 @@ impl Seeker {
         sight: &Sight,
         tree: &Tree,
         shapes: &Shapes,
-        wave: &W,
+        batch: &W,
         leaf: u32,
     ) -> bool {
         let (index, count) = Child::block(leaf);
@@ -133,7 +133,7 @@ impl Seeker {
             return false;
         }
         let met = self.met(s, sight, &look, count);
-        met.open != 0 && self.take::<B, _>(tree, shapes, wave, index, &met)
+        met.open != 0 && self.take::<B, _>(tree, shapes, batch, index, &met)
     }
 
     /// What is met of a leaf, whose index is below the number of blocks.
@@ -157,7 +157,7 @@ impl Seeker {
         &mut self,
         tree: &Tree,
         shapes: &Shapes,
-        wave: &W,
+        batch: &W,
         index: u32,
         met: &Met,
     ) -> bool {
@@ -168,7 +168,7 @@ impl Seeker {
             let at = lane as usize % LANES;
             let place = TriangleSlot { block: index, lane, prim: prims[at] };
             let certain = met.hit >> lane & 1 == 1;
-            if self.offer(tree, shapes, wave, place, certain.then_some((met.low[at], met.high[at]))) {
+            if self.offer(tree, shapes, batch, place, certain.then_some((met.low[at], met.high[at]))) {
                 return true;
             }
         }
@@ -182,7 +182,7 @@ impl Seeker {
         &mut self,
         tree: &Tree,
         shapes: &Shapes,
-        wave: &W,
+        batch: &W,
         place: TriangleSlot,
         between: Option<(f32, f32)>,
     ) -> bool {
@@ -192,16 +192,16 @@ impl Seeker {
         match between {
             Some((low, high)) if low > self.best.high || high < self.t_min => false,
             Some((low, high)) if (low > self.t_min) & (high < self.best.low) & (high <= self.best.high) => {
-                if W::Goal::ANY && !wave.goal(self.number).minds(shapes.opaque.get_or_set(place.prim), place.prim) {
+                if W::Goal::ANY && !batch.goal(self.number).minds(shapes.opaque.get_or_set(place.prim), place.prim) {
                     return false;
                 }
-                if !W::Goal::ANY && wave.filter().is_some() && passes(shapes, wave, self.number, place.prim) {
+                if !W::Goal::ANY && batch.filter().is_some() && passes(shapes, batch, self.number, place.prim) {
                     return false;
                 }
                 self.best = Best { low, high, place };
                 W::Goal::ANY
             }
-            _ => match decide(tree, shapes, wave, self.number, self.best, place, between.is_some()) {
+            _ => match decide(tree, shapes, batch, self.number, self.best, place, between.is_some()) {
                 Some(t) => {
                     self.best = Best { low: t, high: t, place };
                     W::Goal::ANY
@@ -215,8 +215,8 @@ impl Seeker {
 /// Whether a ray passes a prim that it meets, as one that is not there.
 #[cold]
 #[inline(never)]
-fn passes<W: QueryBatch>(shapes: &Shapes, wave: &W, i: usize, prim: u32) -> bool {
-    !shapes.opaque.get_or_set(prim) && wave.filter().is_some_and(|filter| filter.rejects(i, prim))
+fn passes<W: QueryBatch>(shapes: &Shapes, batch: &W, i: usize, prim: u32) -> bool {
+    !shapes.opaque.get_or_set(prim) && batch.filter().is_some_and(|filter| filter.rejects(i, prim))
 }
 
 /// Whether a triangle is hit before the best one so far, which was found by intervals, by the exact test; `certain`: it is on
@@ -226,18 +226,18 @@ fn passes<W: QueryBatch>(shapes: &Shapes, wave: &W, i: usize, prim: u32) -> bool
 pub(super) fn decide<W: QueryBatch>(
     tree: &Tree,
     shapes: &Shapes,
-    wave: &W,
+    batch: &W,
     i: usize,
     best: Best,
     place: TriangleSlot,
     certain: bool,
 ) -> Option<f32> {
-    let (ray, corners) = (wave.ray(i), TriangleSlot::corners(tree, place.packed()));
+    let (ray, corners) = (batch.ray(i), TriangleSlot::corners(tree, place.packed()));
     if !certain && !triangle::is_hit(&RaySpace::checked(ray.origin, ray.dir).0, &corners) {
         return None;
     }
     let t = triangle::distance_along(ray.origin, ray.dir, &corners);
-    let (mut goal, within) = (wave.goal(i), wave.t_min(i)..=ray.t_max.min(f32::MAX));
+    let (mut goal, within) = (batch.goal(i), batch.t_min(i)..=ray.t_max.min(f32::MAX));
     let minds = |goal: &W::Goal| !W::Goal::ANY || goal.minds(shapes.opaque.get_or_set(place.prim), place.prim);
     if !within.contains(&t) || !minds(&goal) || goal.offer(t, place.prim) != Outcome::Hit {
         return None;

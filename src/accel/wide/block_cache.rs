@@ -19,7 +19,7 @@ type CacheKey = (Vec3, usize, usize);
 /// Blocks that were visited lately.
 #[derive(Clone, Debug)]
 pub(super) struct BlockCache {
-    seat: CacheKey,
+    key: CacheKey,
     /// Which block is in a place.
     blocks: [u32; PLACES],
     kept: Box<[CachedBlock; PLACES]>,
@@ -38,7 +38,7 @@ pub(super) struct CachedBlock {
 impl Default for BlockCache {
     fn default() -> Self {
         let kept = CachedBlock { planes: [[0.0; LANES]; 6], ready: FanReady::EMPTY };
-        Self { seat: (Vec3::ZERO, 0, 0), blocks: [NONE; PLACES], kept: Box::new([kept; PLACES]) }
+        Self { key: (Vec3::ZERO, 0, 0), blocks: [NONE; PLACES], kept: Box::new([kept; PLACES]) }
     }
 }
 
@@ -51,9 +51,9 @@ impl BlockCache {
 
     /// From now on blocks are seen from here; those that were seen from elsewhere are forgotten.
     #[inline(always)]
-    pub(super) fn sit(&mut self, seat: CacheKey) {
-        if self.seat != seat {
-            self.seat = seat;
+    pub(super) fn sit(&mut self, key: CacheKey) {
+        if self.key != key {
+            self.key = key;
             self.clear();
         }
     }

@@ -123,7 +123,7 @@ impl EntryPoint {
     }
 }
 
-/// Which children of a node any ray of a interval may meet.
+/// Which children of a node any ray of an interval ray may meet.
 #[inline(always)]
 fn met<S: Simd>(s: S, tree: &Tree, interval: &IntervalRay, octant: usize, node: u32) -> usize {
     interval.meets(s, &tree.nodes[node as usize].planes, octant, f32::INFINITY).1 as usize % 256

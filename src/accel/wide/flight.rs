@@ -66,19 +66,19 @@ struct Slot {
     children: [u32; DEPTH + LANES],
 }
 
-/// A wave of rays, and the slots that they fly in.
+/// A batch of rays, and the slots that they fly in.
 pub(super) struct InFlight<'w, W, B> {
     pub flight: Flight<'w, W, B>,
     pub slots: &'w mut Slots,
 }
 
-/// A wave of rays.
+/// A batch of rays.
 pub(super) struct Flight<'w, W, B> {
     pub tree: &'w Tree<'w>,
     /// Whether it is worth fetching what is visited next.
     pub far: bool,
     pub shapes: &'w Shapes,
-    pub wave: &'w mut W,
+    pub batch: &'w mut W,
     /// For rays that go by themselves.
     pub entries: &'w mut [Entry],
     pub margins: PhantomData<B>,
@@ -138,7 +138,7 @@ impl Slots {
 struct Queue {
     /// The eight that the next one is of.
     ready: PreparedRays,
-    /// The next one's number in the wave.
+    /// The next one's number in the batch.
     next: usize,
 }
 
@@ -164,7 +164,7 @@ impl<W: QueryBatch, B: BoxMargins> Kernel for InFlight<'_, W, B> {
                 nodes = slots.whereabouts(s).nodes;
             }
         }
-        pending.finish(s, flight.wave);
+        pending.finish(s, flight.batch);
     }
 }
 
@@ -222,15 +222,15 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
     /// answered.
     #[inline(always)]
     fn start<S: Simd>(&mut self, s: S, slots: &mut Slots, number: u32, queue: &mut Queue) {
-        while queue.next < self.wave.rays().len() {
+        while queue.next < self.batch.rays().len() {
             let i = queue.next;
             let lane = i % LANES;
             if lane == 0 {
-                queue.ready.take::<B, _, _>(s, self.tree, self.wave, i);
+                queue.ready.take::<B, _, _>(s, self.tree, self.batch, i);
             }
             queue.next += 1;
             if queue.ready.allowed >> lane & 1 == 0 {
-                ask_by_itself::<B, _>(self.tree, self.shapes, self.wave, i, self.entries);
+                ask_by_itself::<B, _>(self.tree, self.shapes, self.batch, i, self.entries);
                 continue;
             }
             let (ray, root) = (&queue.ready.rays[lane], &self.tree.nodes[0]);
@@ -246,7 +246,7 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
                 slots.taken |= 1 << number;
                 return;
             }
-            self.wave.take(i, Hit::MISS);
+            self.batch.take(i, Hit::MISS);
         }
         slots.taken &= !(1 << number);
     }
@@ -298,7 +298,7 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
             let (slot, at) = slots.at(number);
             let (block, _) = Child::block(*at);
             let done =
-                slot.seeker.take::<B, _>(self.tree, self.shapes, self.wave, block, &met[number as usize % SLOTS]);
+                slot.seeker.take::<B, _>(self.tree, self.shapes, self.batch, block, &met[number as usize % SLOTS]);
             answered |= u32::from(done) << number;
         }
         leaves &= !answered;
@@ -325,7 +325,7 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
             ended &= ended - 1;
             let (slot, at) = slots.at(number);
             *at = Child::END;
-            pending.answer(s, self.tree, self.wave, slot.seeker.number, slot.seeker.found());
+            pending.answer(s, self.tree, self.batch, slot.seeker.number, slot.seeker.found());
             self.start(s, slots, number, queue);
         }
     }

@@ -37,11 +37,11 @@ impl<B: BoxMargins> Culling for Walked<'_, B> {
         self.wide.walk_within::<B, _, _>(query, stack, probe);
     }
 
-    fn trace<W: QueryBatch, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
+    fn trace<W: QueryBatch, P: Probe>(&self, batch: &mut W, stack: &mut Stack, probe: &mut P) {
         if self.counted {
-            return self.wide.trace_within::<B, _, _>(wave, stack, &mut RayCounts::default());
+            return self.wide.trace_within::<B, _, _>(batch, stack, &mut RayCounts::default());
         }
-        self.wide.trace_within::<B, _, _>(wave, stack, probe);
+        self.wide.trace_within::<B, _, _>(batch, stack, probe);
     }
 }
 

@@ -1,6 +1,6 @@
 //! The fast structures: a tree of nodes with eight children, whose leaves are blocks of eight triangles.
 //!
-//! Two ways of cutting the scene share one memory layout (`node`), one proof (`check`) and three ways of tracing a wave:
+//! Two ways of cutting the scene share one memory layout (`node`), one proof (`check`) and three ways of tracing a batch:
 //!
 //! - `fast-octree` ([`Splitting::Octree`]): the uniform grid refined by octrees, kept as boxes. The scene's cube is cut at
 //!   dyadic planes, those of grid and octree cells, and small cells by surface area; every part keeps the tight box of its
@@ -61,7 +61,7 @@ use super::query_batch::QueryBatch;
 use super::{NoProbe, Probe, Shapes};
 use crate::math::simd::{Kernel, Level, WIDE, portably};
 
-/// How the rays of a wave are traced. The answers are the same.
+/// How the rays of a batch are traced. The answers are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TraceMode {
     /// Side by side where most rays run alike; else in flight, or one after another where there are few.
@@ -78,7 +78,7 @@ pub enum TraceMode {
 /// fetch what they visit next, with trees of half a megabyte to four; 7 % slower with one of fourteen (measured).
 const NEAR: usize = 1 << 23;
 
-/// Packets of a wave that are asked how they run, at most: asking all 256 of a wave of 4096 rays took some percent of the
+/// Packets of a batch that are asked how they run, at most: asking all 256 of a batch of 4096 rays took some percent of the
 /// time of rays that hit soon (measured).
 const ASKED: usize = 32;
 
@@ -86,21 +86,21 @@ const ASKED: usize = 32;
 const MANY: usize = 2 * WIDE;
 
 impl TraceMode {
-    /// What suits a wave: by how many of the packets that it would make run to one octant, as far as three rays of each of
+    /// What suits a batch: by how many of the packets that it would make run to one octant, as far as three rays of each of
     /// some tell.
-    fn of<W: QueryBatch>(wave: &W) -> Self {
+    fn of<W: QueryBatch>(batch: &W) -> Self {
         let octant = |i: usize| {
-            let dir = wave.ray(i).dir;
+            let dir = batch.ray(i).dir;
             [dir.x, dir.y, dir.z].map(f32::is_sign_negative)
         };
-        let packets = wave.rays().len() / WIDE;
+        let packets = batch.rays().len() / WIDE;
         let asked = (0..packets).step_by(packets.div_ceil(ASKED).max(1)).map(|p| p * WIDE);
         let total = asked.len();
         let alike = asked.filter(|&i| octant(i) == octant(i + WIDE / 2) && octant(i) == octant(i + WIDE - 1)).count();
         match packets {
             0 => Self::OneByOne,
             _ if 2 * alike > total => Self::Packets,
-            _ if wave.rays().len() >= MANY => Self::InFlight,
+            _ if batch.rays().len() >= MANY => Self::InFlight,
             _ => Self::OneByOne,
         }
     }
@@ -139,7 +139,7 @@ impl<'a> Wide<'a> {
         Self { level, ..self }
     }
 
-    /// Traces waves in another way; the answers are the same.
+    /// Traces batches in another way; the answers are the same.
     #[must_use]
     pub fn with_rays(self, rays: TraceMode) -> Self {
         Self { rays, ..self }
@@ -189,8 +189,8 @@ impl Culling for Wide<'_> {
         self.walk_within::<Derived, _, _>(query, stack, probe);
     }
 
-    fn trace<W: QueryBatch, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
-        self.trace_within::<Derived, _, _>(wave, stack, probe);
+    fn trace<W: QueryBatch, P: Probe>(&self, batch: &mut W, stack: &mut Stack, probe: &mut P) {
+        self.trace_within::<Derived, _, _>(batch, stack, probe);
     }
 }
 
@@ -205,35 +205,35 @@ impl<W: QueryBatch, P: Probe> Together<W, P> {
 }
 
 impl Wide<'_> {
-    /// Traces a wave by given margins.
-    fn trace_within<B: BoxMargins, W: QueryBatch, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
+    /// Traces a batch by given margins.
+    fn trace_within<B: BoxMargins, W: QueryBatch, P: Probe>(&self, batch: &mut W, stack: &mut Stack, probe: &mut P) {
         // Where it is false nothing is compiled for it.
         if Together::<W, P>::MAY {
-            return self.trace_together::<B, _>(wave, stack);
+            return self.trace_together::<B, _>(batch, stack);
         }
         let (tree, shapes) = (&self.tree(), self.shapes);
-        let kernel = OneByOne { tree, shapes, wave, stack, probe, margins: PhantomData::<B> };
+        let kernel = OneByOne { tree, shapes, batch, stack, probe, margins: PhantomData::<B> };
         if Together::<W, P>::ON_EVERY_LEVEL { self.run_narrow::<B, _>(kernel) } else { portably(kernel) }
     }
 
-    fn trace_together<B: BoxMargins, W: QueryBatch>(&self, wave: &mut W, stack: &mut Stack) {
+    fn trace_together<B: BoxMargins, W: QueryBatch>(&self, batch: &mut W, stack: &mut Stack) {
         let (tree, shapes, margins) = (&self.tree(), self.shapes, PhantomData::<B>);
         if !shapes.planes.is_empty() || !tree.runs.is_empty() || tree.nodes.is_empty() {
-            return self.run::<B, _>(OneByOne { tree, shapes, wave, stack, probe: &mut NoProbe, margins });
+            return self.run::<B, _>(OneByOne { tree, shapes, batch, stack, probe: &mut NoProbe, margins });
         }
         let Stack { entries, branches, slots, cache } = stack;
-        let rays = if self.rays == TraceMode::Adaptive { TraceMode::of(wave) } else { self.rays };
+        let rays = if self.rays == TraceMode::Adaptive { TraceMode::of(batch) } else { self.rays };
         match rays {
             TraceMode::Packets => {
-                self.run::<B, _>(InPackets { tree, shapes, wave, stack: branches, cache, entries, margins });
+                self.run::<B, _>(InPackets { tree, shapes, batch, stack: branches, cache, entries, margins });
             }
             TraceMode::InFlight if tree.most_behind() < DEPTH => {
-                let flight = Flight { tree, far: tree.bytes() > NEAR, shapes, wave, entries, margins };
+                let flight = Flight { tree, far: tree.bytes() > NEAR, shapes, batch, entries, margins };
                 // Eight lanes are all it has a use for: with AVX-512's masks it was 4 to 8 % slower on the one processor where
                 // both were measured.
                 self.run_narrow::<B, _>(InFlight { flight, slots });
             }
-            _ => self.run::<B, _>(TraceSingle { tree, shapes, wave, stack: entries, margins }),
+            _ => self.run::<B, _>(TraceSingle { tree, shapes, batch, stack: entries, margins }),
         }
     }
 }

@@ -1,11 +1,11 @@
 //! Sixteen or thirty-two rays side by side: rays that run alike visit the same nodes, which are read and ordered once for all.
 //!
-//! A node's boxes are first asked about all rays at once, by a interval of origins and reciprocals of directions (after
-//! S. Boulos et al., *Packet-based Whitted and Distribution Ray Tracing*, 2007); of several boxes that are left each is asked
-//! about each ray. At a leaf the triangles' own boxes are asked about the interval, and what is left is tested against all rays
-//! at once. Best hits are known by intervals, as in `best`; exact distances are found at the end, those of all rays
-//! together. What rays from one place see of a block is found once for all packets that visit it one soon after the other
-//! (`cache`).
+//! A node's boxes are first asked about all rays at once, by an interval ray (`interval_ray`) of origins and reciprocals of
+//! directions (after S. Boulos et al., *Packet-based Whitted and Distribution Ray Tracing*, 2007); of several boxes that
+//! are left each is asked about each ray. At a leaf the triangles' own boxes are asked about the interval, and what is left
+//! is tested against all rays at once. Best hits are known by intervals, as in `best`; exact distances are found at the
+//! end, those of all rays together. What rays from one place see of a block is found once for all packets that visit it one
+//! soon after the other (`block_cache`).
 //!
 //! What a packet waits for is mostly itself: each test decides which is next. So thirty-two rays, where there are registers
 //! for them, take little more time than sixteen, as long as they stay together; where less than half of them visit what the
@@ -59,11 +59,11 @@ pub(super) struct StackEntry {
     rays: u32,
 }
 
-/// A wave of rays.
+/// A batch of rays.
 pub(super) struct InPackets<'w, W, B> {
     pub tree: &'w Tree<'w>,
     pub shapes: &'w Shapes,
-    pub wave: &'w mut W,
+    pub batch: &'w mut W,
     pub stack: &'w mut [StackEntry],
     pub cache: &'w mut BlockCache,
     /// For rays that go by themselves.
@@ -75,12 +75,12 @@ pub(super) struct InPackets<'w, W, B> {
 struct PacketTrace<'w, W> {
     tree: &'w Tree<'w>,
     shapes: &'w Shapes,
-    wave: &'w mut W,
+    batch: &'w mut W,
     stack: &'w mut [StackEntry],
     cache: &'w mut BlockCache,
     entries: &'w mut [Entry],
     entry_point: EntryPoint,
-    lone: SingleRays,
+    single: SingleRays,
 }
 
 /// `N` rays that run alike.
@@ -137,44 +137,44 @@ impl<W: QueryBatch, B: BoxMargins> Kernel for InPackets<'_, W, B> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { tree, shapes, wave, stack, cache, entries, .. } = self;
+        let Self { tree, shapes, batch, stack, cache, entries, .. } = self;
         let (mut narrow, mut broad) = (Packet::<B, WIDE>::empty(), Packet::<B, BROAD>::empty());
-        if let Some(Pencil { origin, .. }) = wave.pencil() {
+        if let Some(Pencil { origin, .. }) = batch.pencil() {
             broad.start_at(origin);
             narrow.start_at(origin);
         }
         cache.clear();
-        let (entry_point, lone) = (EntryPoint::new(), SingleRays::default());
-        let mut trip = PacketTrace { tree, shapes, wave, stack, cache, entries, entry_point, lone };
-        let (count, mut start) = (trip.wave.rays().len(), 0);
+        let (entry_point, single) = (EntryPoint::new(), SingleRays::default());
+        let mut trace = PacketTrace { tree, shapes, batch, stack, cache, entries, entry_point, single };
+        let (count, mut start) = (trace.batch.rays().len(), 0);
         let (mut apart, mut patience) = (0_usize, PATIENCE);
         while start < count {
-            if let Some(pencil) = trip.wave.pencil()
-                && trip.entry_point.is_passed(start)
+            if let Some(pencil) = trace.batch.pencil()
+                && trace.entry_point.is_passed(start)
             {
-                trip.entry_point.find::<B, _>(s, tree, &pencil, start);
-                if trip.entry_point.state == State::Closed {
-                    trip.wave.take_all(start, &[Hit::MISS; GROUP]);
+                trace.entry_point.find::<B, _>(s, tree, &pencil, start);
+                if trace.entry_point.state == State::Closed {
+                    trace.batch.take_all(start, &[Hit::MISS; GROUP]);
                     start += GROUP;
                     continue;
                 }
             }
             if S::BROAD_FITS && apart == 0 && start + BROAD <= count {
-                let alike = broad.gather(s, s.broad(), &trip, start);
+                let alike = broad.gather(s, s.broad(), &trace, start);
                 if alike.count_ones() >= ENOUGH_BROAD {
-                    let company = broad.pass(s, s.broad(), &mut trip, alike);
+                    let occupancy = broad.pass(s, s.broad(), &mut trace, alike);
                     (apart, patience) =
-                        if company.is_close::<BROAD>() { (0, PATIENCE) } else { (patience, 2 * patience) };
+                        if occupancy.is_close::<BROAD>() { (0, PATIENCE) } else { (patience, 2 * patience) };
                     start += BROAD;
                     continue;
                 }
                 apart = BROAD / WIDE;
             }
-            let alike = narrow.gather(s, s.wide(), &trip, start);
-            narrow.pass(s, s.wide(), &mut trip, if alike.count_ones() >= ENOUGH { alike } else { 0 });
+            let alike = narrow.gather(s, s.wide(), &trace, start);
+            narrow.pass(s, s.wide(), &mut trace, if alike.count_ones() >= ENOUGH { alike } else { 0 });
             (start, apart) = (start + WIDE, apart.saturating_sub(1));
         }
-        trip.lone.finish(s, trip.wave);
+        trace.single.finish(s, trace.batch);
     }
 }
 
@@ -209,18 +209,18 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         &mut self,
         s: S,
         wide: T,
-        trip: &mut PacketTrace<W>,
+        trace: &mut PacketTrace<W>,
         alike: u32,
     ) -> Occupancy {
-        let company = if alike == 0 { Occupancy::default() } else { self.trace(s, wide, alike, trip) };
-        let (mut apart, count) = (all::<N>() & !alike, trip.wave.rays().len());
+        let occupancy = if alike == 0 { Occupancy::default() } else { self.trace(s, wide, alike, trace) };
+        let (mut apart, count) = (all::<N>() & !alike, trace.batch.rays().len());
         for start in (self.start..count.min(self.start + N)).step_by(LANES) {
             if apart & all::<LANES>() != 0 {
-                trip.lone.trace::<B, _, _>(s, trip.tree, trip.shapes, trip.wave, (start, apart), trip.entries);
+                trace.single.trace::<B, _, _>(s, trace.tree, trace.shapes, trace.batch, (start, apart), trace.entries);
             }
             apart >>= LANES;
         }
-        company
+        occupancy
     }
 
     /// Takes the rays from `start` on, if there are as many, and tells which of them run alike.
@@ -229,21 +229,21 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         &mut self,
         s: S,
         wide: T,
-        trip: &PacketTrace<W>,
+        trace: &PacketTrace<W>,
         start: usize,
     ) -> u32 {
         self.start = start;
-        if let Some(Pencil { dirs, .. }) = trip.wave.pencil() {
-            return if self.rays.turn(dirs, start) { self.rays.prepare(wide, trip.tree, &self.t_max) } else { 0 };
+        if let Some(Pencil { dirs, .. }) = trace.batch.pencil() {
+            return if self.rays.turn(dirs, start) { self.rays.prepare(wide, trace.tree, &self.t_max) } else { 0 };
         }
-        let rays = &trip.wave.rays()[start..];
+        let rays = &trace.batch.rays()[start..];
         if let Some(later) = rays.get(AHEAD..AHEAD + N) {
             s.prefetch(later);
         }
         let Some(rays) = rays.first_chunk::<N>() else { return 0 };
         self.t_max = self.rays.spread(s, wide, rays);
-        trip.wave.adapt_t_min(start, &mut self.rays.t_min);
-        self.rays.prepare(wide, trip.tree, &self.t_max)
+        trace.batch.adapt_t_min(start, &mut self.rays.t_min);
+        self.rays.prepare(wide, trace.tree, &self.t_max)
     }
 
     /// From the root to every leaf that any of these rays may hit. The others get an answer, too, which means nothing.
@@ -253,9 +253,9 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         s: S,
         wide: T,
         alike: u32,
-        trip: &mut PacketTrace<W>,
+        trace: &mut PacketTrace<W>,
     ) -> Occupancy {
-        let (tree, mut company) = (trip.tree, Occupancy::default());
+        let (tree, mut occupancy) = (trace.tree, Occupancy::default());
         if alike != all::<N>() {
             self.rays.fill(wide, alike, &mut self.t_max);
         }
@@ -268,15 +268,15 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let limit = B::widened_lanes(wide, high);
         self.active = self.rays.meet(wide, first, last, limit) & alike;
         if self.active == 0 {
-            trip.wave.take_all(self.start, &[Hit::MISS; N]);
-            return company;
+            trace.batch.take_all(self.start, &[Hit::MISS; N]);
+            return occupancy;
         }
         self.found.prim = [NO_PRIM; N];
         self.rays.bound(wide, tree);
         let (rays, per_length) = (&self.rays, self.rays.per_length());
         let sight = match rays.common {
             Some(from) => {
-                trip.cache.sit((from, rays.z, rays.octant));
+                trace.cache.sit((from, rays.z, rays.octant));
                 Seen::Together(Fan::new(wide, from, &rays.dir, rays.z, per_length))
             }
             None => Seen::Apart(RowSight::new(wide, &rays.origin, &rays.dir, rays.z, per_length)),
@@ -285,32 +285,32 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let limit = wide.choose(self.active, limit, wide.splat(f32::NEG_INFINITY));
         let mut reach: Reach<T, N> = Reach { low, high, limit, farthest: wide.latest(limit) };
         let (mut top, mut branch) =
-            (0, StackEntry { near: 0.0, child: trip.entry_point.of(self.start, N), rays: self.active });
+            (0, StackEntry { near: 0.0, child: trace.entry_point.of(self.start, N), rays: self.active });
         loop {
             let mut nearer = false;
-            company.visits += 1;
-            company.rays += branch.rays.count_ones();
+            occupancy.visits += 1;
+            occupancy.rays += branch.rays.count_ones();
             if Child::is_leaf(branch.child) {
-                self.visit(s, wide, trip, branch, &mut reach, &sight);
+                self.visit(s, wide, trace, branch, &mut reach, &sight);
                 if W::Goal::ANY && self.active == 0 {
                     break;
                 }
             } else {
                 let below = top;
                 // The entry point is no node of the tree.
-                let node = tree.nodes.get(branch.child as usize).unwrap_or(&trip.entry_point.node);
-                self.push(s, wide, (tree, node), branch.rays, &reach, (trip.stack, &mut top));
+                let node = tree.nodes.get(branch.child as usize).unwrap_or(&trace.entry_point.node);
+                self.push(s, wide, (tree, node), branch.rays, &reach, (trace.stack, &mut top));
                 nearer = top > below;
             }
             // Those that meet the nearest child were just found; rays that need no more have no limit above zero.
-            if !nearer && !drop_unneeded(wide, &reach, trip.stack, &mut top) {
+            if !nearer && !drop_unneeded(wide, &reach, trace.stack, &mut top) {
                 break;
             }
             top -= 1;
-            branch = trip.stack[top];
+            branch = trace.stack[top];
         }
-        self.answer(s, wide, trip);
-        company
+        self.answer(s, wide, trace);
+        occupancy
     }
 
     /// Tests a leaf.
@@ -319,12 +319,12 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         &mut self,
         s: S,
         wide: T,
-        trip: &mut PacketTrace<W>,
+        trace: &mut PacketTrace<W>,
         branch: StackEntry,
         reach: &mut Reach<T, N>,
         sight: &Seen<T, N>,
     ) {
-        let changed = self.test(s, wide, trip, branch, reach, sight);
+        let changed = self.test(s, wide, trace, branch, reach, sight);
         if changed == 0 {
             return;
         }
@@ -375,20 +375,20 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         &mut self,
         s: S,
         wide: T,
-        trip: &mut PacketTrace<W>,
+        trace: &mut PacketTrace<W>,
         branch: StackEntry,
         reach: &mut Reach<T, N>,
         sight: &Seen<T, N>,
     ) -> u32 {
         let (index, count) = Child::block(branch.child);
-        let block = &trip.tree.blocks[index as usize];
+        let block = &trace.tree.blocks[index as usize];
         let used = (1 << count) - 1;
         match sight {
             Seen::Together(fan) => {
-                let place = trip.cache.place(s, (index, block), fan);
-                let kept = trip.cache.at(place);
+                let place = trace.cache.place(s, (index, block), fan);
+                let kept = trace.cache.at(place);
                 let lanes = self.rays.meets_any(s, &kept.planes, reach.farthest).1 & used;
-                self.test_each(wide, trip, (block, index, lanes), branch.rays, reach, (fan, &kept.ready))
+                self.test_each(wide, trace, (block, index, lanes), branch.rays, reach, (fan, &kept.ready))
             }
             Seen::Apart(rows) => {
                 let lanes = self.rays.meets_any_triangle(s, block, reach.farthest) & used;
@@ -396,7 +396,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
                     return 0;
                 }
                 let ready = rows.ready(s, &block.corners);
-                self.test_each(wide, trip, (block, index, lanes), branch.rays, reach, (rows, &ready))
+                self.test_each(wide, trace, (block, index, lanes), branch.rays, reach, (rows, &ready))
             }
         }
     }
@@ -406,7 +406,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     fn test_each<T: Lanewise<N>, W: QueryBatch, R: Rows<T, N>>(
         &mut self,
         wide: T,
-        trip: &PacketTrace<W>,
+        trace: &PacketTrace<W>,
         (block, index, lanes): (&Block, u32, u32),
         mut rays: u32,
         reach: &mut Reach<T, N>,
@@ -420,7 +420,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             if (verdicts.hit | verdicts.unsure) & rays != 0 {
                 let place = TriangleSlot { block: index, lane, prim: block.prims[lane as usize % LANES] };
                 let between = sight.distances(wide, ready, lane as usize, &look);
-                let hit = self.take(wide, trip, (place, rays), verdicts, between, reach);
+                let hit = self.take(wide, trace, (place, rays), verdicts, between, reach);
                 changed |= hit;
                 if W::Goal::ANY {
                     rays &= !hit;
@@ -436,7 +436,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     fn take<T: Lanewise<N>, W: QueryBatch>(
         &mut self,
         s: T,
-        trip: &PacketTrace<W>,
+        trace: &PacketTrace<W>,
         (place, rays): (TriangleSlot, u32),
         verdicts: Verdicts,
         [low, high]: [T::Lanes; 2],
@@ -444,22 +444,22 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     ) -> u32 {
         let prim = place.prim;
         let rays = rays & !s.find_word(prim, &self.rays.exclude);
-        let opaque = !W::Goal::ANY || trip.shapes.opaque.get_or_set(prim);
-        if !opaque && !trip.wave.goal(self.start).wants_open() {
+        let opaque = !W::Goal::ANY || trace.shapes.opaque.get_or_set(prim);
+        if !opaque && !trace.batch.goal(self.start).wants_open() {
             return 0;
         }
         let (mut hit, unsure) = (verdicts.hit & rays, verdicts.unsure & rays);
         let t_min = s.load(&self.rays.t_min);
         let mut better = s.less(t_min, low) & s.less(high, reach.low) & s.at_most(high, reach.high) & hit;
-        if !W::Goal::ANY && better != 0 && trip.wave.filter().is_some() {
-            let gone = self.passing(trip.shapes, trip.wave, prim, better);
+        if !W::Goal::ANY && better != 0 && trace.batch.filter().is_some() {
+            let gone = self.passing(trace.shapes, trace.batch, prim, better);
             (better, hit) = (better & !gone, hit & !gone);
         }
         // The exact test decides about distances that may be equal, and about what lanes cannot tell.
         let in_time = s.at_most(low, reach.high) & s.at_most(t_min, high);
         let mut open = hit & in_time & !better | unsure;
         if !opaque && better != 0 {
-            better = self.minding(trip.wave, prim, better);
+            better = self.minding(trace.batch, prim, better);
         }
         (reach.low, reach.high) = (s.choose(better, low, reach.low), s.choose(better, high, reach.high));
         s.put_word(better, prim, &mut self.found.prim);
@@ -476,7 +476,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
                     high: high[ray],
                     place: TriangleSlot::unpacked(self.found.place[ray], self.found.prim[ray]),
                 };
-                if let Some(t) = decide(trip.tree, trip.shapes, &*trip.wave, i, best, place, certain) {
+                if let Some(t) = decide(trace.tree, trace.shapes, &*trace.batch, i, best, place, certain) {
                     (low[ray], high[ray]) = (t, t);
                     (self.found.prim[ray], self.found.place[ray]) = (place.prim, place.packed());
                     changed |= 1 << ray;
@@ -490,16 +490,16 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     /// The rays of a mask that pass a prim that they meet, as one that is not there.
     #[cold]
     #[inline(never)]
-    fn passing<W: QueryBatch>(&self, shapes: &Shapes, wave: &W, prim: u32, rays: u32) -> u32 {
+    fn passing<W: QueryBatch>(&self, shapes: &Shapes, batch: &W, prim: u32, rays: u32) -> u32 {
         let open = !shapes.opaque.get_or_set(prim);
-        wave.filter().filter(|_| open).map_or(0, |filter| filter.rejects_of(self.start, rays, prim))
+        batch.filter().filter(|_| open).map_or(0, |filter| filter.rejects_of(self.start, rays, prim))
     }
 
     /// The rays of a mask that mind being hit by a prim that is not opaque.
     #[cold]
     #[inline(never)]
-    fn minding<W: QueryBatch>(&self, wave: &W, prim: u32, rays: u32) -> u32 {
-        those(rays, |ray| wave.goal(self.start + ray).minds(false, prim))
+    fn minding<W: QueryBatch>(&self, batch: &W, prim: u32, rays: u32) -> u32 {
+        those(rays, |ray| batch.goal(self.start + ray).minds(false, prim))
     }
 
     /// Where the rays of a mask meet what they hit.
@@ -523,15 +523,15 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
 
     /// Gives the answers, all distances and weights together.
     #[inline(always)]
-    fn answer<S: Simd, T: Lanewise<N>, W: QueryBatch>(&mut self, s: S, wide: T, trip: &mut PacketTrace<W>) {
-        let (start, found, tree) = (self.start, &self.found, trip.tree);
+    fn answer<S: Simd, T: Lanewise<N>, W: QueryBatch>(&mut self, s: S, wide: T, trace: &mut PacketTrace<W>) {
+        let (start, found, tree) = (self.start, &self.found, trace.tree);
         if W::Goal::ANY {
-            trip.wave.take_all(start, &found.prim.map(|prim| Hit { prim, ..Hit::MISS }));
+            trace.batch.take_all(start, &found.prim.map(|prim| Hit { prim, ..Hit::MISS }));
             return;
         }
         let hit = !wide.find_word(NO_PRIM, &found.prim) & all::<N>();
         if hit == 0 {
-            return trip.wave.take_all(start, &[Hit::MISS; N]);
+            return trace.batch.take_all(start, &[Hit::MISS; N]);
         }
         let zero = wide.splat(0.0);
         let place = found.place[hit.trailing_zeros() as usize % N];
@@ -548,14 +548,14 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         while unsure != 0 {
             let ray = unsure.trailing_zeros() as usize % N;
             unsure &= unsure - 1;
-            let Ray { origin, dir, .. } = trip.wave.ray(start + ray);
+            let Ray { origin, dir, .. } = trace.batch.ray(start + ray);
             let corners = TriangleSlot::corners(tree, found.place[ray]);
             (t[ray], u[ray], v[ray]) = triangle::place(&RaySpace::checked(origin, dir).0, &corners);
         }
         for (k, prim) in found.prim.as_chunks::<LANES>().0.iter().enumerate() {
             let [t, u, v] = [&t.as_chunks().0[k], &u.as_chunks().0[k], &v.as_chunks().0[k]];
             let rows = s.rows([s.load(t), s.load(u), s.load(v), s.load(&prim.map(f32::from_bits))]);
-            trip.wave.take_all(start + LANES * k, &Hit::from_fours(rows));
+            trace.batch.take_all(start + LANES * k, &Hit::from_fours(rows));
         }
     }
 }

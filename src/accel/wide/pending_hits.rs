@@ -14,7 +14,7 @@ use crate::math::triangles::corners_of;
 /// Rays whose hits wait for their distances.
 pub(super) struct PendingHits {
     pairs: Pairs,
-    /// Their numbers in the wave, and what they hit.
+    /// Their numbers in the batch, and what they hit.
     rays: [usize; LANES],
     prims: [u32; LANES],
     count: usize,
@@ -33,17 +33,17 @@ impl PendingHits {
         &mut self,
         s: S,
         tree: &Tree,
-        wave: &mut W,
+        batch: &mut W,
         i: usize,
         place: TriangleSlot,
     ) {
         if place.prim == NO_PRIM {
-            return wave.take(i, Hit::MISS);
+            return batch.take(i, Hit::MISS);
         }
         if W::Goal::ANY {
-            return wave.take(i, Hit { prim: place.prim, t: 0.0, u: 0.0, v: 0.0 });
+            return batch.take(i, Hit { prim: place.prim, t: 0.0, u: 0.0, v: 0.0 });
         }
-        let (ray, block) = (wave.ray(i), &tree.blocks[place.block as usize]);
+        let (ray, block) = (batch.ray(i), &tree.blocks[place.block as usize]);
         let (at, lane) = (self.count % LANES, place.lane as usize % LANES);
         for k in 0..3 {
             self.pairs.origin[k][at] = ray.origin[k];
@@ -55,13 +55,13 @@ impl PendingHits {
         (self.rays[at], self.prims[at]) = (i, place.prim);
         self.count += 1;
         if self.count == LANES {
-            self.finish(s, wave);
+            self.finish(s, batch);
         }
     }
 
     /// Answers those that wait.
     #[inline(always)]
-    pub(super) fn finish<S: Simd, W: QueryBatch>(&mut self, s: S, wave: &mut W) {
+    pub(super) fn finish<S: Simd, W: QueryBatch>(&mut self, s: S, batch: &mut W) {
         let count = std::mem::replace(&mut self.count, 0);
         if count == 0 {
             return;
@@ -72,17 +72,17 @@ impl PendingHits {
             let hit = if met.sure >> lane & 1 == 1 {
                 Hit { t: met.t[lane], u: met.weights[0][lane], v: met.weights[1][lane], prim }
             } else {
-                self.exactly(wave, lane)
+                self.exactly(batch, lane)
             };
-            wave.take(i, hit);
+            batch.take(i, hit);
         }
     }
 
     /// The hit of one ray by the scalar form.
     #[cold]
     #[inline(never)]
-    fn exactly<W: QueryBatch>(&self, wave: &W, lane: usize) -> Hit {
-        let (ray, corners) = (wave.ray(self.rays[lane]), corners_of(&self.pairs.corners, lane));
+    fn exactly<W: QueryBatch>(&self, batch: &W, lane: usize) -> Hit {
+        let (ray, corners) = (batch.ray(self.rays[lane]), corners_of(&self.pairs.corners, lane));
         let (t, u, v) = triangle::place(&RaySpace::checked(ray.origin, ray.dir).0, &corners);
         Hit { t, u, v, prim: self.prims[lane] }
     }

@@ -1,4 +1,4 @@
-//! Eight rays of a wave made ready together, for kernels that then trace each by itself.
+//! Eight rays of a batch made ready together, for kernels that then trace each by itself.
 
 use super::node::Tree;
 use super::padded::{PaddedSlabs, Padding};
@@ -38,18 +38,18 @@ impl Default for PreparedRays {
 }
 
 impl PreparedRays {
-    /// Takes the rays of a wave from `start` on, of which there is one at least.
+    /// Takes the rays of a batch from `start` on, of which there is one at least.
     #[inline(always)]
-    pub(super) fn take<B: BoxMargins, S: Simd, W: QueryBatch>(&mut self, s: S, tree: &Tree, wave: &W, start: usize) {
-        let rays = &wave.rays()[start..];
-        let Columns { origin: o, dir: d, t_min, t_max } = match wave.pencil() {
+    pub(super) fn take<B: BoxMargins, S: Simd, W: QueryBatch>(&mut self, s: S, tree: &Tree, batch: &W, start: usize) {
+        let rays = &batch.rays()[start..];
+        let Columns { origin: o, dir: d, t_min, t_max } = match batch.pencil() {
             Some(pencil) if rays.len() >= LANES => Columns::of_pencil(s, &pencil, start),
             _ => Columns::of(s, rays),
         };
         let last = rays.len() - 1;
-        self.exclude = std::array::from_fn(|lane| wave.exclude(start + lane.min(last)));
+        self.exclude = std::array::from_fn(|lane| batch.exclude(start + lane.min(last)));
         self.t_min = s.store(t_min);
-        wave.adapt_t_min(start, &mut self.t_min[..rays.len().min(LANES)]);
+        batch.adapt_t_min(start, &mut self.t_min[..rays.len().min(LANES)]);
         let t_min = s.load(&self.t_min);
         // A distance that overflows is no hit; a NaN stays.
         let t_max = s.smaller(s.splat(f32::MAX), t_max);
@@ -263,11 +263,11 @@ mod tests {
         let after: Vec<Hit> = (0..rays.len()).map(|i| Hit { t: i as f32 * 0.25, ..Hit::MISS }).collect();
         for level in Level::all() {
             let mut hits = vec![Hit::MISS; rays.len()];
-            let wave = NextBatch { rays, after: &after, filter: None, hits: &mut hits, test: Exact };
+            let batch = NextBatch { rays, after: &after, filter: None, hits: &mut hits, test: Exact };
             for start in [0, LANES] {
-                let ready = level.run(Take(&tree, &wave, start));
+                let ready = level.run(Take(&tree, &batch, start));
                 for (i, lane) in (start..rays.len()).zip(0..LANES) {
-                    let expected = plainly(&tree, &Ray { t_min: wave.t_min(i), ..rays[i] });
+                    let expected = plainly(&tree, &Ray { t_min: batch.t_min(i), ..rays[i] });
                     assert_eq!(format!("{:?}", of(&ready, lane)), format!("{expected:?}"), "{}", level.name());
                 }
             }

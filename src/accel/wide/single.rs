@@ -13,11 +13,11 @@ use crate::accel::query::Goal;
 use crate::accel::query_batch::QueryBatch;
 use crate::math::simd::{Kernel, LANES, Simd};
 
-/// A wave of rays.
+/// A batch of rays.
 pub(super) struct TraceSingle<'w, W, B> {
     pub tree: &'w Tree<'w>,
     pub shapes: &'w Shapes,
-    pub wave: &'w mut W,
+    pub batch: &'w mut W,
     pub stack: &'w mut [Entry],
     pub margins: PhantomData<B>,
 }
@@ -27,12 +27,12 @@ impl<W: QueryBatch, B: BoxMargins> Kernel for TraceSingle<'_, W, B> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { tree, shapes, wave, stack, .. } = self;
-        let mut lone = SingleRays::default();
-        for start in (0..wave.rays().len()).step_by(LANES) {
-            lone.trace::<B, _, _>(s, tree, shapes, wave, (start, u32::MAX), stack);
+        let Self { tree, shapes, batch, stack, .. } = self;
+        let mut single = SingleRays::default();
+        for start in (0..batch.rays().len()).step_by(LANES) {
+            single.trace::<B, _, _>(s, tree, shapes, batch, (start, u32::MAX), stack);
         }
-        lone.finish(s, wave);
+        single.finish(s, batch);
     }
 }
 
@@ -44,42 +44,42 @@ pub(super) struct SingleRays {
 }
 
 impl SingleRays {
-    /// Of eight rays of a wave from `start` on, or as many as there are, traces those of a mask.
+    /// Of eight rays of a batch from `start` on, or as many as there are, traces those of a mask.
     #[inline(always)]
     pub(super) fn trace<B: BoxMargins, S: Simd, W: QueryBatch>(
         &mut self,
         s: S,
         tree: &Tree,
         shapes: &Shapes,
-        wave: &mut W,
+        batch: &mut W,
         (start, which): (usize, u32),
         stack: &mut [Entry],
     ) {
-        self.ready.take::<B, _, _>(s, tree, wave, start);
-        for i in start..wave.rays().len().min(start + LANES) {
+        self.ready.take::<B, _, _>(s, tree, batch, start);
+        for i in start..batch.rays().len().min(start + LANES) {
             let lane = i - start;
             if which >> lane & 1 == 0 {
                 continue;
             }
             if self.ready.allowed >> lane & 1 == 0 {
-                ask_by_itself::<B, _>(tree, shapes, wave, i, stack);
+                ask_by_itself::<B, _>(tree, shapes, batch, i, stack);
                 continue;
             }
             let ray = &self.ready.rays[lane % LANES];
             let mut seeker = Seeker::new(ray, self.ready.t_min[lane % LANES], i, self.ready.exclude[lane % LANES]);
             if W::Goal::ANY {
-                descend_any::<B, _, _>(s, tree, shapes, wave, ray, &mut seeker, stack);
+                descend_any::<B, _, _>(s, tree, shapes, batch, ray, &mut seeker, stack);
             } else {
-                descend::<B, _, _>(s, tree, shapes, wave, ray, &mut seeker, stack);
+                descend::<B, _, _>(s, tree, shapes, batch, ray, &mut seeker, stack);
             }
-            self.pending.answer(s, tree, wave, i, seeker.found());
+            self.pending.answer(s, tree, batch, i, seeker.found());
         }
     }
 
     /// Answers those that wait for it.
     #[inline(always)]
-    pub(super) fn finish<S: Simd, W: QueryBatch>(&mut self, s: S, wave: &mut W) {
-        self.pending.finish(s, wave);
+    pub(super) fn finish<S: Simd, W: QueryBatch>(&mut self, s: S, batch: &mut W) {
+        self.pending.finish(s, batch);
     }
 }
 
@@ -89,7 +89,7 @@ fn descend<B: BoxMargins, S: Simd, W: QueryBatch>(
     s: S,
     tree: &Tree,
     shapes: &Shapes,
-    wave: &W,
+    batch: &W,
     ray: &PreparedRay,
     seeker: &mut Seeker,
     stack: &mut [Entry],
@@ -107,7 +107,7 @@ fn descend<B: BoxMargins, S: Simd, W: QueryBatch>(
                 pop(stack, &mut top, seeker.limit).unwrap_or(Child::END)
             };
         }
-        if seeker.test::<B, _, _>(s, &ray.sight, tree, shapes, wave, child) {
+        if seeker.test::<B, _, _>(s, &ray.sight, tree, shapes, batch, child) {
             return;
         }
         child = pop(stack, &mut top, seeker.limit).unwrap_or(Child::END);
@@ -121,7 +121,7 @@ fn descend_any<B: BoxMargins, S: Simd, W: QueryBatch>(
     s: S,
     tree: &Tree,
     shapes: &Shapes,
-    wave: &W,
+    batch: &W,
     ray: &PreparedRay,
     seeker: &mut Seeker,
     stack: &mut [Entry],
@@ -148,7 +148,7 @@ fn descend_any<B: BoxMargins, S: Simd, W: QueryBatch>(
             }
             child = node.children[lane];
         }
-        if seeker.test::<B, _, _>(s, &ray.sight, tree, shapes, wave, child) {
+        if seeker.test::<B, _, _>(s, &ray.sight, tree, shapes, batch, child) {
             return;
         }
         top -= 1;

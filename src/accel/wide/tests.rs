@@ -1,4 +1,4 @@
-//! However the rays of a wave are traced, on whatever instruction set: the answers are those of brute force.
+//! However the rays of a batch are traced, on whatever instruction set: the answers are those of brute force.
 
 use super::entry_point::GROUP;
 use super::flight::{DEPTH, FARTHEST_FIRST};
@@ -10,7 +10,7 @@ use crate::math::Vec3;
 use crate::math::random::Random;
 use crate::math::simd::{Level, WIDE};
 
-const WAYS: [TraceMode; 4] = [TraceMode::OneByOne, TraceMode::InFlight, TraceMode::Packets, TraceMode::Adaptive];
+const MODES: [TraceMode; 4] = [TraceMode::OneByOne, TraceMode::InFlight, TraceMode::Packets, TraceMode::Adaptive];
 
 /// First hits, the hits behind them, what is blocked, and what would be if some of the rest let light through.
 fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> String {
@@ -32,28 +32,28 @@ fn first_hits<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<Hit> {
     hits
 }
 
-/// For some rays sixteen side by side that start with them, every other time each from a place of its own: most bundles
+/// For some rays sixteen side by side that start with them, every other time each from a place of its own: most packets
 /// run alike, some straddle an octant.
-fn bundles(rays: &[Ray]) -> Vec<Ray> {
+fn packets(rays: &[Ray]) -> Vec<Ray> {
     side_by_side(rays, 16)
 }
 
-/// Rays in bundles of so many.
+/// Rays in packets of so many.
 fn side_by_side(rays: &[Ray], count: usize) -> Vec<Ray> {
-    let bundle = |(i, ray): (usize, &Ray)| {
+    let packet = |(i, ray): (usize, &Ray)| {
         let (ray, width) = (*ray, ray.dir.length() * 0.03);
         let side =
             move |k: usize| Vec3::new(0.3, -0.2, 0.1) * (k % 4) as f32 + Vec3::new(0.0, 0.1, 0.2) * (k / 4) as f32;
         let apart = width * (i % 2) as f32;
         (0..count).map(move |k| Ray { origin: ray.origin - side(k) * apart, dir: ray.dir + side(k) * width, ..ray })
     };
-    rays.iter().step_by(5).enumerate().flat_map(bundle).filter(|r| r.dir != Vec3::ZERO).collect()
+    rays.iter().step_by(5).enumerate().flat_map(packet).filter(|r| r.dir != Vec3::ZERO).collect()
 }
 
-fn assert_all_ways_agree(name: &str, shapes: &Shapes, rays: &[Ray]) {
+fn assert_all_modes_agree(name: &str, shapes: &Shapes, rays: &[Ray]) {
     let expected = answers(&Unculled::new(shapes), rays);
     for level in Level::all() {
-        for way in WAYS {
+        for way in MODES {
             let wide = Wide::build(shapes, Splitting::SurfaceArea).at_level(level).with_rays(way);
             assert!(answers(&wide, rays) == expected, "{name}: {way:?} on {}", level.name());
         }
@@ -63,7 +63,7 @@ fn assert_all_ways_agree(name: &str, shapes: &Shapes, rays: &[Ray]) {
 #[test]
 fn rays_in_flight_and_in_packets_hit_what_brute_force_hits() {
     for (name, shapes) in scenes::all() {
-        assert_all_ways_agree(name, &shapes, &scenes::rays(&shapes, 6));
+        assert_all_modes_agree(name, &shapes, &scenes::rays(&shapes, 6));
     }
 }
 
@@ -72,7 +72,7 @@ fn rays_that_run_alike_hit_what_brute_force_hits() {
     for (name, shapes) in scenes::all() {
         for count in [16, 32, 80] {
             let rays = side_by_side(&scenes::rays(&shapes, 6), count);
-            assert_all_ways_agree(name, &shapes, &rays);
+            assert_all_modes_agree(name, &shapes, &rays);
         }
     }
 }
@@ -86,12 +86,12 @@ fn rays_among_others_that_run_otherwise_hit_what_brute_force_hits() {
         for count in [16, 32] {
             let alike = side_by_side(&scenes::rays(&shapes, 4), count);
             let mut rays: Vec<Ray> = Vec::new();
-            for (i, bundle) in alike.chunks(count).enumerate() {
+            for (i, packet) in alike.chunks(count).enumerate() {
                 let apart = [1, 2, 7, 8, 9, 15][i % 6] * count / 16;
-                let mut bundle = bundle.to_vec();
+                let mut packet = packet.to_vec();
                 for _ in 0..apart {
-                    let (k, ray) = (r.below(bundle.len()), bundle[0]);
-                    bundle[k] = match r.below(5) {
+                    let (k, ray) = (r.below(packet.len()), packet[0]);
+                    packet[k] = match r.below(5) {
                         0 => Ray { dir: -ray.dir, ..ray },
                         1 => Ray { dir: Vec3::new(ray.dir.y, ray.dir.z, ray.dir.x), ..ray },
                         2 => Ray { t_min: 2.0, t_max: 1.0, ..ray },
@@ -99,9 +99,9 @@ fn rays_among_others_that_run_otherwise_hit_what_brute_force_hits() {
                         _ => Ray { origin: ray.origin * 1e30, ..ray },
                     };
                 }
-                rays.extend(bundle);
+                rays.extend(packet);
             }
-            assert_all_ways_agree(name, &shapes, &rays);
+            assert_all_modes_agree(name, &shapes, &rays);
         }
     }
 }
@@ -122,7 +122,7 @@ fn the_rays_of_a_pencil_hit_what_they_hit_one_by_one() {
                 )
             };
             let rays: Vec<Ray> = (0..[75, 64, 17][k % 3]).map(turned).filter(|ray| ray.dir != Vec3::ZERO).collect();
-            assert_a_pencil_hits(name, &shapes, &rays, &WAYS);
+            assert_a_pencil_hits(name, &shapes, &rays, &MODES);
         }
     }
 }
@@ -209,12 +209,12 @@ fn passed(shapes: &Shapes, wide: &Wide, rays: &[Ray], after: Option<&[Hit]>, wha
 
 #[test]
 fn rays_that_pass_gaps_hit_what_lies_behind_them() {
-    let mut all = [0; WAYS.len()];
+    let mut all = [0; MODES.len()];
     for (name, shapes) in scenes::all() {
         let alone = scenes::rays(&shapes, 4);
         let beside = side_by_side(&alone, 32);
         for level in Level::all() {
-            for (way, all) in WAYS.into_iter().zip(&mut all) {
+            for (way, all) in MODES.into_iter().zip(&mut all) {
                 let wide = Wide::build(&shapes, Splitting::SurfaceArea).at_level(level).with_rays(way);
                 let what = format!("{name}: {way:?} on {}", level.name());
                 for rays in [&alone, &beside] {
@@ -233,7 +233,7 @@ fn a_wave_may_be_of_any_length() {
     let shapes = scenes::soup(60, 0.4);
     let rays = side_by_side(&scenes::rays(&shapes, 2), 48);
     for count in [0, 1, 15, 16, 17, 31, 32, 33, 48, 49, 150] {
-        assert_all_ways_agree("soup", &shapes, &rays[..count]);
+        assert_all_modes_agree("soup", &shapes, &rays[..count]);
     }
 }
 
@@ -255,7 +255,7 @@ fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not_and_there
     let toward = |k: usize| Ray { dir: Vec3::new(1.0, 2.0 + k as f32 * 0.01, 3.0), ..mixed[0] };
     assert_eq!(of(&(0..64).map(toward).collect::<Vec<_>>()), TraceMode::Packets);
     assert_eq!(of(&mixed[..9]), TraceMode::OneByOne);
-    // Of long waves some packets are asked, and not only the first.
+    // Of long batches some packets are asked, and not only the first.
     let long = |rays: &dyn Fn(usize) -> Ray| (0..WIDE * ASKED * 3).map(rays).collect::<Vec<_>>();
     let turning = |k: usize| mixed[k % mixed.len()];
     let half = |first: bool| move |k: usize| if (k < WIDE * ASKED) == first { toward(k % 64) } else { turning(k) };
@@ -305,8 +305,8 @@ fn rays_along_axes_within_the_planes_of_boxes_hit_what_brute_force_hits() {
     ];
     for (name, shapes, far) in scenes {
         let rays = along_axes(&shapes, 240, far);
-        assert_all_ways_agree(name, &shapes, &rays);
-        assert_all_ways_agree(name, &shapes, &bundles(&rays[..60]));
+        assert_all_modes_agree(name, &shapes, &rays);
+        assert_all_modes_agree(name, &shapes, &packets(&rays[..60]));
     }
 }
 
@@ -334,7 +334,7 @@ fn trees_too_deep_for_rays_in_flight_are_answered() {
     }
     let expected = answers(&Unculled::new(&shapes), &rays);
     for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
-        for way in WAYS {
+        for way in MODES {
             let wide = Wide::build(&shapes, splitting).with_rays(way);
             assert!(answers(&wide, &rays) == expected, "{way:?} of {splitting:?}");
         }
@@ -346,7 +346,7 @@ fn trees_too_deep_for_rays_in_flight_are_answered() {
 fn rays_along_axes_from_far_away_hit_what_brute_force_hits() {
     let shapes = scenes::lattice(120);
     for far in [1e3, 1e5, 1e7] {
-        assert_all_ways_agree("lattice", &shapes, &along_axes(&shapes, 240, far));
+        assert_all_modes_agree("lattice", &shapes, &along_axes(&shapes, 240, far));
     }
 }
 
@@ -367,8 +367,8 @@ fn rays_that_start_on_what_they_hit_hit_it() {
         let hits = Unculled::new(&shapes);
         let at_once = first_hits(&hits, &rays).iter().filter(|hit| hit.t == 0.0).count();
         assert!(at_once > 90, "{name}: {at_once}");
-        assert_all_ways_agree(name, &shapes, &rays);
-        assert_all_ways_agree(name, &shapes, &bundles(&rays));
+        assert_all_modes_agree(name, &shapes, &rays);
+        assert_all_modes_agree(name, &shapes, &packets(&rays));
     }
 }
 
@@ -378,6 +378,6 @@ fn rays_without_a_range_hit_nothing() {
     for (t_min, t_max) in [(0.0, f32::NAN), (f32::NAN, 1.0), (f32::NAN, f32::NAN), (2.0, 1.0), (0.0, f32::NEG_INFINITY)]
     {
         let rays: Vec<Ray> = scenes::rays(&shapes, 6).iter().map(|&ray| Ray { t_min, t_max, ..ray }).collect();
-        assert_all_ways_agree("soup", &shapes, &rays);
+        assert_all_modes_agree("soup", &shapes, &rays);
     }
 }

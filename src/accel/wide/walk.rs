@@ -50,7 +50,7 @@ impl Stack {
 pub(super) struct OneByOne<'w, W, P, B> {
     pub tree: &'w Tree<'w>,
     pub shapes: &'w Shapes,
-    pub wave: &'w mut W,
+    pub batch: &'w mut W,
     pub stack: &'w mut Stack,
     pub probe: &'w mut P,
     pub margins: PhantomData<B>,
@@ -61,31 +61,31 @@ impl<W: QueryBatch, P: Probe, B: BoxMargins> Kernel for OneByOne<'_, W, P, B> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { tree, shapes, wave, stack: Stack { entries: stack, .. }, probe, .. } = self;
+        let Self { tree, shapes, batch, stack: Stack { entries: stack, .. }, probe, .. } = self;
         let Some(root) = tree.nodes.first().filter(|_| shapes.planes.is_empty()) else {
-            for i in 0..wave.rays().len() {
-                ask::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe);
+            for i in 0..batch.rays().len() {
+                ask::<B, _, _, _>(s, tree, shapes, batch, i, stack, probe);
             }
             return;
         };
-        for i in 0..wave.rays().len() {
-            let ray = &wave.rays()[i];
+        for i in 0..batch.rays().len() {
+            let ray = &batch.rays()[i];
             if !(B::allow(tree, ray.origin) && has_direction(ray.dir)) {
-                ask::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe);
+                ask::<B, _, _, _>(s, tree, shapes, batch, i, stack, probe);
                 continue;
             }
             // Many rays meet no box at all: those need no more than this.
-            let slabs = Slabs::<B>::new(ray.origin, ray.dir, wave.t_min(i));
+            let slabs = Slabs::<B>::new(ray.origin, ray.dir, batch.t_min(i));
             let met = slabs.meets(s, root, B::widened(ray.t_max));
             if P::SILENT && met.1 == 0 {
-                wave.take(i, Hit::MISS);
+                batch.take(i, Hit::MISS);
                 continue;
             }
-            let (mut query, usable) = begin(shapes, wave, i, probe);
+            let (mut query, usable) = begin(shapes, batch, i, probe);
             if usable {
                 descend(s, tree, &slabs, met, &mut query, stack, probe);
             }
-            end(wave, i, &query, probe);
+            end(batch, i, &query, probe);
         }
     }
 }
@@ -103,11 +103,11 @@ fn has_direction(dir: Vec3) -> bool {
 pub(super) fn ask_by_itself<B: BoxMargins, W: QueryBatch>(
     tree: &Tree,
     shapes: &Shapes,
-    wave: &mut W,
+    batch: &mut W,
     i: usize,
     stack: &mut [Entry],
 ) {
-    ask::<B, _, _, _>(Portable, tree, shapes, wave, i, stack, &mut NoProbe);
+    ask::<B, _, _, _>(Portable, tree, shapes, batch, i, stack, &mut NoProbe);
 }
 
 /// A ray that goes its own way through whatever there is.
@@ -116,16 +116,16 @@ fn ask<B: BoxMargins, S: Simd, W: QueryBatch, P: Probe>(
     s: S,
     tree: &Tree,
     shapes: &Shapes,
-    wave: &mut W,
+    batch: &mut W,
     i: usize,
     stack: &mut [Entry],
     probe: &mut P,
 ) {
-    let (mut query, usable) = begin(shapes, wave, i, probe);
+    let (mut query, usable) = begin(shapes, batch, i, probe);
     if usable && !query.test_planes(probe) {
         walk::<B, _, _, _>(s, tree, &mut query, stack, probe);
     }
-    end(wave, i, &query, probe);
+    end(batch, i, &query, probe);
 }
 
 /// One query under way.

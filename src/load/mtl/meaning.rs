@@ -289,7 +289,7 @@ impl Meaning<'_> {
         }
     }
 
-    /// `Ka` is what most programs write without queries: 0, 1, or a copy of `Kd`.
+    /// `Ka` is what most programs write without looking: 0, 1, or a copy of `Kd`.
     fn ambient(&mut self, kd: Vec3) -> Vec3 {
         let ka = self.mtl.ka.map(color);
         if !self.guessing() {
@@ -387,7 +387,7 @@ impl Meaning<'_> {
     /// `aniso`, `anisor`.
     fn anisotropy(&self) -> Option<Anisotropy> {
         // A map of turns has them in its picture.
-        let turns = self.mtl.anisor.filter(|_| !(self.has_map)(Slot::GrainTurn));
+        let turns = self.mtl.anisor.filter(|_| !(self.has_map)(Slot::AnisotropyRotation));
         let rotation = turns.map_or(0.0, |turns| number(turns.rem_euclid(1.0) * std::f64::consts::TAU));
         Some(Anisotropy { strength: self.share_under(Slot::Anisotropy, self.mtl.aniso)?, rotation, map: None })
     }

@@ -65,7 +65,7 @@ pub(super) enum Slot {
     Coat,
     CoatRoughness,
     Anisotropy,
-    GrainTurn,
+    AnisotropyRotation,
 }
 
 /// Map statements, in lower case.
@@ -101,7 +101,7 @@ const MAPS: [(&[u8], Slot); 32] = [
     (b"map_pc", Slot::Coat),
     (b"map_pcr", Slot::CoatRoughness),
     (b"map_aniso", Slot::Anisotropy),
-    (b"map_anisor", Slot::GrainTurn),
+    (b"map_anisor", Slot::AnisotropyRotation),
 ];
 
 /// What is said of a decal: what it shows where is said by no picture, but by procedures of one program.
@@ -158,7 +158,7 @@ impl Mtl {
             Slot::Coat,
             Slot::CoatRoughness,
             Slot::Anisotropy,
-            Slot::GrainTurn,
+            Slot::AnisotropyRotation,
         ];
         [self.pr, self.pm, self.ps, self.pc, self.pcr, self.aniso, self.anisor].iter().any(Option::is_some)
             || MAPS.iter().any(|&slot| self.map(slot).is_some())

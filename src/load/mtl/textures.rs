@@ -387,7 +387,7 @@ impl Mapper<'_> {
     /// Strength and direction of a grain in one texture; both go by the options of the first there is.
     fn anisotropy(&mut self) -> Option<TextureRef> {
         let channel = |(map, picture): (&Map, usize)| (picture, map.channel.unwrap_or(Channel::Luminance));
-        let (strength, turn) = (self.picture(Slot::Anisotropy), self.picture(Slot::GrainTurn));
+        let (strength, turn) = (self.picture(Slot::Anisotropy), self.picture(Slot::AnisotropyRotation));
         let map = strength.or(turn)?.0.clone();
         let most = self.mtl.anisor.filter(|turns| *turns != 0.0 || self.mode == MtlMode::Literal).unwrap_or(1.0);
         let take = Take::Anisotropy(strength.map(channel), turn.map(channel), most.to_bits());

@@ -44,7 +44,7 @@ pub(crate) struct AlphaVoids<'a> {
     world: &'a World,
     textures: &'a TextureStore<'a>,
     /// By mesh.
-    sheets: Vec<Option<MaskedMesh<'a>>>,
+    masked_meshes: Vec<Option<MaskedMesh<'a>>>,
     /// The prims that are faces of masked meshes and stored, in order, and how many come before each of these runs.
     runs: Vec<(Range<u32>, usize)>,
     count: usize,
@@ -67,7 +67,7 @@ impl<T> Late<T> {
         Self { enough, asked: AtomicUsize::new(0), taken: AtomicBool::new(false), found: OnceLock::new() }
     }
 
-    /// Nobody finds it.
+    /// It is never computed.
     fn never() -> Self {
         Self { taken: AtomicBool::new(true), ..Self::after(usize::MAX) }
     }
@@ -126,12 +126,12 @@ impl<'a> AlphaVoids<'a> {
             return None;
         }
         let of_mesh = |mesh: &'a Mesh| of_materials[mesh.material as usize].and_then(|cut| cut.on(mesh, textures));
-        let sheets: Vec<_> = scene.meshes.iter().map(of_mesh).collect();
-        if sheets.iter().all(Option::is_none) {
+        let masked_meshes: Vec<_> = scene.meshes.iter().map(of_mesh).collect();
+        if masked_meshes.iter().all(Option::is_none) {
             return None;
         }
         let of_instance = |(i, instance): (u32, &Instance)| {
-            sheets[instance.mesh as usize].as_ref()?;
+            masked_meshes[instance.mesh as usize].as_ref()?;
             Some(world.triangles_of(i)).filter(|prims| !prims.is_empty() && world.is_stored(prims.start))
         };
         let (mut runs, mut count): (Vec<(Range<u32>, usize)>, _) = (Vec::new(), 0);
@@ -143,14 +143,14 @@ impl<'a> AlphaVoids<'a> {
             }
             count += more;
         }
-        let distinct: HashSet<_> = sheets.iter().flatten().map(|sheet| sheet.cut.what()).collect();
+        let distinct: HashSet<_> = masked_meshes.iter().flatten().map(|masked_mesh| masked_mesh.cut.what()).collect();
         let texels = distinct.into_iter().map(|(map, ..)| textures.size(map)).map(|size| (size.x * size.y) as usize);
         let enough = ENOUGH + count / FACES + texels.sum::<usize>() / TEXELS;
         Some(Self {
             scene,
             world,
             textures,
-            sheets,
+            masked_meshes,
             runs,
             count,
             maps: Late::after(enough),
@@ -163,7 +163,7 @@ impl<'a> AlphaVoids<'a> {
         AlphaFilter { alpha_voids: self, rays, cones }
     }
 
-    /// Whether a ray that looks meets prim `prim`, if it does, where nothing is for certain.
+    /// Whether a ray that asks for its first hit meets prim `prim`, if it does, where nothing is for certain.
     fn rejects(&self, sight: &Sight, prim: u32) -> bool {
         let known = self.face(prim, 1).filter(|(_, map)| map.has_gaps());
         known.is_some_and(|(face, map)| face.sure(map, &Rays::new([*sight], true)).clear == 1)
@@ -200,9 +200,9 @@ impl<'a> AlphaVoids<'a> {
     fn make(&self, maps: &Maps, prim: u32) -> Option<Face> {
         let PrimSource::Triangle { instance, triangle } = self.world.source(prim) else { return None };
         let mesh = self.scene.instances[instance as usize].mesh as usize;
-        let (sheet, map) = (self.sheets[mesh].as_ref()?, maps.of_meshes[mesh]?);
+        let (masked_mesh, map) = (self.masked_meshes[mesh].as_ref()?, maps.of_meshes[mesh]?);
         Option::as_ref(&maps.surveys[map as usize])?;
-        sheet.face(self.world, (instance, triangle, prim), map)
+        masked_mesh.face(self.world, (instance, triangle, prim), map)
     }
 
     fn all_faces(&self, maps: &Maps) -> Vec<Face> {
@@ -220,7 +220,7 @@ impl<'a> AlphaVoids<'a> {
                 surveys.len() as u32 - 1
             })
         };
-        let of_meshes = self.sheets.iter().map(|sheet| Some(number(&sheet.as_ref()?.cut))).collect();
+        let of_meshes = self.masked_meshes.iter().map(|masked_mesh| Some(number(&masked_mesh.as_ref()?.cut))).collect();
         Maps { surveys, of_meshes }
     }
 }

@@ -110,7 +110,7 @@ impl Kernel for Look<'_> {
     fn run<S: Simd>(self, s: S) {
         let Self { found, painted, overlays, to, points, bsdf, has_inside, sky, ambient } = self;
         let (points, emission) = (points.min(POINTS), bsdf.emission);
-        let around = EnvironmentLight { sky, ambient };
+        let everywhere = EnvironmentLight { sky, ambient };
         match &bsdf.model {
             Model::Unlit(_) if painted.any => {
                 (0..points).for_each(|i| put(&mut to.radiance, i, painted.emission(i) + painted.unlit(i)));
@@ -128,23 +128,23 @@ impl Kernel for Look<'_> {
             Model::MetalRough(m) if painted.any => {
                 let (mapped, emission) = (Mapped { m: *m, painted }, |i| painted.emission(i));
                 if let Some(overlays) = overlays {
-                    look(s, &mapped, (found, |_| true), to, points, around, |_| Vec3::ZERO);
-                    overlays.show(s, found, to, points, around, emission);
+                    look(s, &mapped, (found, |_| true), to, points, everywhere, |_| Vec3::ZERO);
+                    overlays.show(s, found, to, points, everywhere, emission);
                 } else if has_inside {
-                    look(s, &mapped, (found, |i| found.front[i] == 1), to, points, around, emission);
+                    look(s, &mapped, (found, |i| found.front[i] == 1), to, points, everywhere, emission);
                 } else {
-                    look(s, &mapped, (found, |_| true), to, points, around, emission);
+                    look(s, &mapped, (found, |_| true), to, points, everywhere, emission);
                 }
             }
             Model::MetalRough(m) => {
                 let even = Even { m: m.in_the_open(), row: m.shares(), mean: mean_albedo(m.roughness()) };
                 if let Some(overlays) = overlays {
-                    look(s, &even, (found, |_| true), to, points, around, |_| Vec3::ZERO);
-                    overlays.show(s, found, to, points, around, |_| emission);
+                    look(s, &even, (found, |_| true), to, points, everywhere, |_| Vec3::ZERO);
+                    overlays.show(s, found, to, points, everywhere, |_| emission);
                 } else if has_inside {
-                    look(s, &even, (found, |i| found.front[i] == 1), to, points, around, |_| emission);
+                    look(s, &even, (found, |i| found.front[i] == 1), to, points, everywhere, |_| emission);
                 } else {
-                    look(s, &even, (found, |_| true), to, points, around, |_| emission);
+                    look(s, &even, (found, |_| true), to, points, everywhere, |_| emission);
                 }
             }
         }
@@ -291,7 +291,7 @@ fn look<S: Simd>(
         (to.open, to.mirrored) = ([0.0; POINTS], [[0.0; POINTS]; 3]);
     }
     for i in 0..points.min(POINTS) {
-        let around = EnvironmentTerms {
+        let terms = EnvironmentTerms {
             n_v: to.n_v[i],
             shares: (to.shares[0][i], to.shares[1][i]),
             diffuse: get(&to.diffuse, i) + ambient,
@@ -302,7 +302,7 @@ fn look<S: Simd>(
             turned_back: 0.0,
         };
         let bsdf = m.bsdf(i);
-        put(&mut to.radiance, i, emission(i) + bsdf.around(&around, bsdf.rebound(m.mean_albedo(&to.mean, i))).0);
+        put(&mut to.radiance, i, emission(i) + bsdf.around(&terms, bsdf.rebound(m.mean_albedo(&to.mean, i))).0);
     }
 }
 

@@ -58,13 +58,13 @@ impl ShadingBatch {
         (common, lobes): (&MaterialConstants, Lobes),
         mut tell: impl FnMut(usize, Option<&LobeFrame>, &Reader),
     ) {
-        let by_sheet = common
+        let side_by_side = common
             .material_maps
             .as_ref()
             .filter(|material_maps| material_maps.covers(mesh))
             .map_or(&[][..], MaterialMaps::lobes);
         let unread = |&(map, space): &_| Known { map, space, texel: Vec4::ONE };
-        let mut known: Vec<Known> = by_sheet.iter().map(unread).collect();
+        let mut known: Vec<Known> = side_by_side.iter().map(unread).collect();
         let reads_mesh = lobes.reads_mesh || lobes.reads_maps && known.is_empty();
         let placement = (!mesh.normals.is_empty()).then_some(placement);
         let (mut prim, mut patch) = (NO_PRIM, None);

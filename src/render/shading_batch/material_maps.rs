@@ -282,7 +282,7 @@ fn alone<'a>(alpha: Option<&'a TextureRef>, color: Option<&TextureRef>) -> Optio
 impl ShadingBatch {
     /// Reads what maps of a material and the colours of vertices say at the points of a mesh that an instance has placed so, and
     /// turns their normals. If lights show as highlights, which a normal map `widens`, it finds how far that turns them.
-    pub(super) fn read_sheet(
+    pub(super) fn read_material_maps(
         &mut self,
         context: &Context,
         (material, material_maps): (&Material, &MaterialMaps),

@@ -4,9 +4,9 @@
 //! numbers, and the same formulas are computed for all points. They are written once, for one point, in `surface`, `patch`,
 //! `shade`, `glint` and `accel::refine`; here loops over columns of numbers call them, which the compiler turns into lanes.
 //! So a point shaded here gives the same bits as one shaded by itself, on every instruction set. Of lights with an extent
-//! each point draws places of its own (`wide`). Sheen and clear coat lie over what the columns know (`overlays`). Rays that
-//! go on from glass and clear coat, what other lobes of a material show, and what is seen of panoramas and by rays to the
-//! surroundings, are found point by point, from the numbers in the columns (`lobes`, `ground`).
+//! each point draws places of its own (`area_lights`). Sheen and clear coat lie over what the columns know (`overlays`).
+//! Rays that go on from glass and clear coat, what other lobes of a material show, and what is seen of panoramas and by
+//! rays to the surroundings, are found point by point, from the numbers in the columns (`lobes`, `ground`).
 //!
 //! What a column cannot do is left to the tracer: hits near the edge of a face, those whose distance needs more than
 //! `f64`, points whose mesh gives no tangent, and glass from which no ray goes on.

@@ -184,7 +184,7 @@ impl Overlays {
         found: &Found,
         to: &mut Surroundings,
         points: usize,
-        around: EnvironmentLight,
+        everywhere: EnvironmentLight,
         emission: impl Fn(usize) -> Vec3,
     ) {
         let points = points.min(POINTS);
@@ -194,10 +194,10 @@ impl Overlays {
             put(&mut to.radiance, i, all);
         }
         if self.has_sheen {
-            self.show_sheen(found, to, points, around);
+            self.show_sheen(found, to, points, everywhere);
         }
         if self.has_coat {
-            self.show_coat(s, found, to, points, around);
+            self.show_coat(s, found, to, points, everywhere);
         }
         for i in 0..points {
             let [below_coat, _] = self.clear_at(i);
@@ -207,15 +207,15 @@ impl Overlays {
     }
 
     #[inline(always)]
-    fn show_sheen(&mut self, found: &Found, to: &mut Surroundings, points: usize, around: EnvironmentLight) {
+    fn show_sheen(&mut self, found: &Found, to: &mut Surroundings, points: usize, everywhere: EnvironmentLight) {
         for i in 0..points {
             put(&mut self.dirs, i, found.seen(i).mirrored());
         }
         let Self { dirs, light, sheen_roughness, .. } = self;
-        blur(around.sky, |i| SheenLobe::blur(sheen_roughness[i]), dirs, points, light);
+        blur(everywhere.sky, |i| SheenLobe::blur(sheen_roughness[i]), dirs, points, light);
         for i in 0..points {
             let [below_coat, _] = self.clear_at(i);
-            let sheen = self.sheen(i).around(get(&self.light, i) + around.ambient) * below_coat;
+            let sheen = self.sheen(i).around(get(&self.light, i) + everywhere.ambient) * below_coat;
             let all = get(&to.radiance, i) + sheen;
             put(&mut to.radiance, i, all);
         }
@@ -228,7 +228,7 @@ impl Overlays {
         found: &Found,
         to: &mut Surroundings,
         points: usize,
-        around: EnvironmentLight,
+        everywhere: EnvironmentLight,
     ) {
         // Of what is as smooth as clear coat mostly is rays show all.
         let looked_up = (0..points).fold(false, |any, i| any | (self.coat(i).looked_up() > 0.0));
@@ -241,7 +241,7 @@ impl Overlays {
             put(&mut self.dirs, i, dir);
         }
         let Self { dirs, light, coat_roughness, n_v, shares: [scale, bias], .. } = self;
-        blur(around.sky, |i| coat_roughness[i], dirs, points, light);
+        blur(everywhere.sky, |i| coat_roughness[i], dirs, points, light);
         let at = coat_roughness.as_chunks().0.iter().zip(n_v.as_chunks().0);
         let eights = scale.as_chunks_mut().0.iter_mut().zip(bias.as_chunks_mut().0);
         for ((roughness, n_v), (scale, bias)) in at.zip(eights).take(points.div_ceil(LANES)) {
@@ -249,7 +249,7 @@ impl Overlays {
         }
         for i in 0..points {
             let share = self.coat(i).share_looked_up((self.shares[0][i], self.shares[1][i]));
-            let all = get(&to.radiance, i) + (get(&self.light, i) + around.ambient) * share;
+            let all = get(&to.radiance, i) + (get(&self.light, i) + everywhere.ambient) * share;
             put(&mut to.radiance, i, all);
         }
     }

@@ -194,7 +194,7 @@ impl ShadingBatch {
         if let Some(material_maps) =
             common.material_maps.as_ref().filter(|material_maps| material_maps.covers(placed.mesh))
         {
-            self.read_sheet(context, (material, material_maps), placed, widens);
+            self.read_material_maps(context, (material, material_maps), placed, widens);
             return;
         }
         let (mut prim, mut patch) = (NO_PRIM, None);

@@ -62,12 +62,12 @@ impl EnvironmentDistribution {
             let chances: Vec<f64> = chances.collect();
             let sum: f64 = chances.iter().sum();
             let mut up_to = 0.0;
-            let part = |chance: &f64| {
-                up_to += if sum > 0.0 { chance / sum } else { 0.0 };
+            let part = |distribution: &f64| {
+                up_to += if sum > 0.0 { distribution / sum } else { 0.0 };
                 up_to as f32
             };
             columns.push(Sums::new(chances.iter().map(part).collect()));
-            densities.extend(chances.iter().map(|chance| (chance / area) as f32));
+            densities.extend(chances.iter().map(|distribution| (distribution / area) as f32));
             rows_sum += sum;
             rows.push(rows_sum as f32);
         }
@@ -139,10 +139,10 @@ mod tests {
         let mut random = Random::new(6);
         for (count, bright) in [(1, 1.0), (2, 0.0), (7, 300.0), (300, 1.0), (1024, 1e6)] {
             let mut sum = 0.0;
-            let mut chance = |i: usize| if i == count / 3 { bright } else { (random.unit() - 0.2).max(0.0) };
+            let mut distribution = |i: usize| if i == count / 3 { bright } else { (random.unit() - 0.2).max(0.0) };
             let up_to: Vec<f32> = (0..count)
                 .map(|i| {
-                    sum += chance(i);
+                    sum += distribution(i);
                     sum
                 })
                 .collect();

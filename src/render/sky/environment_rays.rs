@@ -113,7 +113,7 @@ impl EnvironmentRays {
                 let share = if share.is_finite() { share } else { Vec3::ZERO };
                 if share.max_element() > 0.0 {
                     let ray = point.surface.ray(above(dir, side), point.ray.sample);
-                    #[expect(clippy::cast_possible_truncation, reason = "few shares wait, see AROUND_LIMIT")]
+                    #[expect(clippy::cast_possible_truncation, reason = "few shares wait, see ENVIRONMENT_RAYS_LIMIT")]
                     let light = Bound { radiance: share, tag: self.shares.len() as u32 };
                     self.shadows.push_bound(ray, light, point.media);
                 }

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 /// So much of the sphere lies beyond the cap at most, sr: a sun with what shines around it, 9° across.
 const MOST: f32 = 0.02;
 
-/// What hotspot must have of all the light to be worth rays of its own.
+/// What a hotspot must have of all the light to be worth rays of its own.
 const LEAST: f64 = 0.01;
 
 #[derive(Clone, Debug)]
@@ -21,11 +21,11 @@ pub(super) struct Hotspot {
     /// What lies below the cap.
     without: Pyramid,
     /// Of what lies beyond.
-    chance: EnvironmentDistribution,
+    distribution: EnvironmentDistribution,
     /// How much of the sphere an even light would cover that is as bright and as much, sr.
     area: f32,
     /// Mean over the sphere of the greatest channel of what is calm.
-    calm_mean: f32,
+    mean_without: f32,
 }
 
 impl Hotspot {
@@ -52,15 +52,15 @@ impl Hotspot {
         let (hotspot, all) = (sum_of(&|light| sum(beyond(light))), sum_of(&sum));
         let squares = sum_of(&|light| sum(beyond(light)).powi(2));
         #[expect(clippy::cast_possible_truncation, reason = "an area and a mean")]
-        let (area, calm_mean) = (
+        let (area, mean_without) = (
             (hotspot * hotspot / squares) as f32,
             (sum_of(&|light| f64::from(capped(light).max_element())) / (4.0 * PI)) as f32,
         );
         (hotspot > LEAST * all && all.is_finite() && squares.is_finite()).then(|| Self {
             without: Pyramid::sharp(level.with(capped)),
-            chance: EnvironmentDistribution::new(level.with(beyond), 0.0),
+            distribution: EnvironmentDistribution::new(level.with(beyond), 0.0),
             area,
-            calm_mean,
+            mean_without,
         })
     }
 }
@@ -74,7 +74,7 @@ impl Sky {
         }
     }
 
-    /// How much of the sphere hotspot covers, sr, were it even; `None`: there is none.
+    /// How much of the sphere the hotspot covers, sr, were it even; `None`: there is none.
     pub(crate) fn hotspot(&self) -> Option<f32> {
         self.map.as_ref().and_then(|map| map.hotspot()).map(|hotspot| hotspot.area)
     }
@@ -84,20 +84,20 @@ impl Sky {
     pub(crate) fn is_worth_a_ray(&self, light: Vec3, cutoff: f32) -> bool {
         /// Much less than a weight, as suns are bright.
         const PART: f32 = 1.0 / 16.0;
-        let calm = self.map.as_ref().and_then(|map| map.hotspot()).map_or(0.0, |hotspot| hotspot.calm_mean);
+        let calm = self.map.as_ref().and_then(|map| map.hotspot()).map_or(0.0, |hotspot| hotspot.mean_without);
         light.max_element() > PART * cutoff * calm
     }
 
-    /// A direction to hotspot, drawn with two numbers from 0 … 1, and its radiance over the density of drawing it.
+    /// A direction to the hotspot, drawn with two numbers from 0 … 1, and its radiance over the density of drawing it.
     pub(crate) fn to_hotspot(&self, at: [f32; 2]) -> Option<(Vec3, Vec3)> {
         let map = self.map.as_ref()?;
-        let chance = &map.hotspot()?.chance;
-        let dir = chance.draw(at);
-        let (radiance, density) = chance.look(dir);
+        let distribution = &map.hotspot()?.distribution;
+        let dir = distribution.draw(at);
+        let (radiance, density) = distribution.look(dir);
         (density > 0.0).then(|| (self.to_world(map, dir), radiance / density))
     }
 
-    /// Radiance along a unit direction without hotspot, averaged over a cone of this angle across (radians).
+    /// Radiance along a unit direction without the hotspot, averaged over a cone of this angle across (radians).
     pub(crate) fn without_hotspot(&self, dir: Vec3, angle: f32) -> Vec3 {
         match self.map.as_ref().and_then(|map| map.hotspot().map(|hotspot| (map, hotspot))) {
             Some((map, hotspot)) => hotspot.without.radiance(self.to_map(map, dir), angle),
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sun_is_glare_and_a_wide_or_a_weak_light_is_not() {
+    fn a_sun_is_a_hotspot_and_a_wide_or_a_weak_light_is_not() {
         let area = sky(3.0, 1000.0).hotspot().expect("a sun");
         let sun = 2.0 * std::f32::consts::PI * (1.0 - libm::cosf(1.5_f32.to_radians()));
         assert!((area / sun - 1.0).abs() < 0.15, "{area} of {sun}");

@@ -55,7 +55,7 @@ struct Map {
 #[derive(Debug)]
 struct Tables {
     pyramid: Pyramid,
-    chance: EnvironmentDistribution,
+    distribution: EnvironmentDistribution,
     /// Found when it is first asked for.
     hotspot: OnceLock<Option<Hotspot>>,
 }
@@ -63,8 +63,18 @@ struct Tables {
 impl Tables {
     fn of(panorama: &Panorama) -> Self {
         let pyramid = Pyramid::new(panorama);
-        let chance = EnvironmentDistribution::new(pyramid.at_most(distribution::COLUMNS).clone(), distribution::EVEN);
-        Self { pyramid, chance, hotspot: OnceLock::new() }
+        let distribution =
+            EnvironmentDistribution::new(pyramid.at_most(distribution::COLUMNS).clone(), distribution::EVEN);
+        Self { pyramid, distribution, hotspot: OnceLock::new() }
+    }
+
+    /// Found by each thread that asks before it is known: none waits for another, which could be at work for the one that waits.
+    fn hotspot(&self) -> Option<&Hotspot> {
+        if self.hotspot.get().is_none() {
+            let found = Hotspot::of(&self.pyramid);
+            self.hotspot.get_or_init(|| found);
+        }
+        self.hotspot.get().and_then(Option::as_ref)
     }
 
     /// Those that an earlier picture has left with the panorama, if they are of these texels.
@@ -77,8 +87,7 @@ impl Tables {
 impl Map {
     /// If it has any, and that was asked for.
     fn hotspot(&self) -> Option<&Hotspot> {
-        let found = self.seeks_hotspot.then(|| self.tables.hotspot.get_or_init(|| Hotspot::of(&self.tables.pyramid)));
-        found.and_then(Option::as_ref)
+        self.seeks_hotspot.then(|| self.tables.hotspot()).flatten()
     }
 }
 
@@ -177,14 +186,14 @@ impl Sky {
 
     /// A direction to look in for light, drawn with two numbers from 0 … 1; `None` where no direction is better than others.
     fn draw(&self, at: [f32; 2]) -> Option<Vec3> {
-        self.map.as_ref().map(|map| self.to_world(map, map.tables.chance.draw(at)))
+        self.map.as_ref().map(|map| self.to_world(map, map.tables.distribution.draw(at)))
     }
 
     /// Radiance as [`Self::draw`] knows it, and the density of drawing this direction, 1/sr.
     fn drawn(&self, dir: Vec3) -> (Vec3, f32) {
         self.map
             .as_ref()
-            .map_or_else(|| (self.radiance(dir, 0.0), 0.0), |map| map.tables.chance.look(self.to_map(map, dir)))
+            .map_or_else(|| (self.radiance(dir, 0.0), 0.0), |map| map.tables.distribution.look(self.to_map(map, dir)))
     }
 
     fn to_map(&self, map: &Map, dir: Vec3) -> Vec3 {
@@ -242,6 +251,8 @@ mod tests {
         let (first, second) = (sky(&panorama), sky(&turned));
         assert!(Arc::ptr_eq(&first.tables, &second.tables) && first.turn != second.turn);
         assert!(first.hotspot().is_some());
+        let scene = Scene { environment: Environment::Panorama, panorama: Some(turned), ..Scene::default() };
+        assert!(Sky::new(&scene).hotspot().is_none(), "not asked for");
         let dark = Panorama { texels: Arc::new(vec![[0.1; 3]; 64 * 32]), ..panorama };
         let other = sky(&dark);
         assert!(!Arc::ptr_eq(&first.tables, &other.tables) && other.hotspot().is_none());

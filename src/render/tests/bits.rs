@@ -416,8 +416,9 @@ fn lobes_shaded_side_by_side_have_the_bits_of_lobes_shaded_one_by_one() {
 /// `s` with sheen and clear coat alone over what is metallic-rough, one or both, smooth and rough, their maps of so many
 /// textures.
 fn overlaid(mut s: Stage, textures: u32) -> Stage {
+    let turned = UvTransform { scale: Vec2::new(2.0, -1.5), rotation: 0.7, ..UvTransform::default() };
     let map = |i: usize, texture: u32| {
-        let transform = UvTransform { scale: Vec2::new(1.0 + i as f32, 1.0), ..UvTransform::default() };
+        let transform = if i.is_multiple_of(2) { UvTransform::default() } else { turned };
         (textures > 0).then(|| TextureRef { texture: texture % textures, uv_set: (i % 2) as u32, transform })
     };
     let matters = s.scene.materials.iter_mut().filter_map(|material| match &mut material.reflection {
@@ -446,10 +447,18 @@ fn sheen_and_coat_over_points_side_by_side_have_the_bits_of_those_over_points_on
         (Environment::Studio, 3, 1, None),
         (Environment::Black, 3, 1, None),
         (Environment::Constant(Vec3::splat(0.2)), 3, 0, None),
+        (Environment::Studio, 3, 3, None),
         (Environment::Studio, 3, 3, Some(2)),
+        (Environment::Panorama, 3, 2, Some(0)),
     ];
-    for (environment, textures, depth, env_rays) in cases {
-        let mut s = overlaid(if textures > 0 { painted() } else { plain() }, textures);
+    for (k, (environment, textures, depth, env_rays)) in cases.into_iter().enumerate() {
+        let stage = if textures > 0 { painted() } else { plain() };
+        // Rough glass blurs what is seen through it.
+        let mut s = overlaid(if depth > 1 { glazed(stage, 3) } else { stage }, textures);
+        // In some cases also by rays.
+        s.settings.gloss_rays = (k % 2 == 1).then_some(2);
+        let texels = (0..32 * 16).map(|i| [0.1 * (i % 9) as f32, 0.5, if i == 99 { 40.0 } else { 0.2 }]).collect();
+        s.scene.panorama = Some(Panorama { width: 32, height: 16, texels: Arc::new(texels), ..Panorama::default() });
         for light in &mut s.scene.lights {
             light.size = if depth > 1 { 0.2 } else { 0.0 };
         }

@@ -365,7 +365,7 @@ fn what_touches_glass_from_behind_is_seen_whichever_comes_first_in_the_file() {
 }
 
 #[test]
-fn a_table_under_a_glass_is_seen_all_over_a_picture_by_points_and_by_strips_of_them() {
+fn a_table_under_a_glass_is_seen_all_over_a_picture_by_points_and_by_batches_of_them() {
     let mut s = stage(View::look_at(DVec3::new(1.0, -4.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.3)));
     (s.settings.width, s.settings.height) = (24, 16);
     let slab = s.add_material(glass(1.5));

@@ -59,7 +59,7 @@ fn four_rays_see_the_sun_in_a_rough_mirror_as_bright_as_all_of_its_facets_do() {
 
 #[test]
 fn what_facets_would_send_to_the_wrong_side_is_sent_to_the_right_one_in_sight_of_the_sun_too() {
-    // Suns of a little less than what hotspot may be and of a little more, which only rays that are spread see.
+    // Suns of a little less than what a hotspot may be and of a little more, which only rays that are spread see.
     let light = |texels: usize, rays: u32, material: Material, from: DVec3| {
         let (sky, radiance, area) = sun(texels);
         let mut s = under(sky, 1.0);

@@ -9,7 +9,7 @@ use crate::render::layers::empty;
 use crate::render::tile::{Alone, Tile, render_some};
 use crate::render::{Sampling, Stochastic};
 
-/// A stage without rays that are spread by chance, before which what they meet is looked at.
+/// A stage without rays that are spread by chance: nothing is traced beforehand.
 fn sharp() -> Stage {
     let mut s = soft();
     (s.settings.lens, s.settings.gloss_rays) = (None, None);

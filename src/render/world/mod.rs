@@ -111,7 +111,7 @@ impl World {
     }
 
     /// A structure over everything, and the reason where there was a choice. Where anything is instanced, kinds that cannot
-    /// hold it give way to `fast-octree`, as [`AnyAccel::kind`] tells: to compare structures, keep nothing
+    /// hold it give way to `fast-octree`, as [`AnyAccel::kind`] tells: to compare structures, instance nothing
     /// ([`World::new`]).
     ///
     /// # Panics
@@ -210,7 +210,7 @@ impl World {
         self.prim(hit.prim).refine(ray, hit)
     }
 
-    /// The same, in which no prim is opaque: each is asked what light it lets through (see [`no_prune`](super::everything)).
+    /// The same, in which no prim is opaque: each is asked what light it lets through (see [`no_prune`](super::no_prune)).
     #[must_use]
     pub fn without_pruning(mut self) -> Self {
         self.shapes.opaque = BitSet::filled(self.shapes.len(), false);

@@ -1,7 +1,7 @@
 //! The box of the model without its strays: parts so few, so small and so far away that nobody meant them to be seen.
 
 use super::crowd::Crowd;
-use super::parts::{Anisotropy, Part, faces, gather, hull, solids};
+use super::parts::{Granularity, Part, faces, gather, hull, solids};
 use super::slices::{Covered, Slices};
 use crate::math::DVec3;
 use crate::scene::corners::{Hull, Outline, object_boxes, placed_box, take_in};
@@ -80,7 +80,7 @@ fn of_faces(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
 
 /// The box of the model of any scene, part by part.
 fn by_parts(scene: &Scene) -> Bounds {
-    let Some(whole) = hull(scene, Anisotropy::Faces, |_| true) else {
+    let Some(whole) = hull(scene, Granularity::Faces, |_| true) else {
         let unit = (DVec3::splat(-0.5), DVec3::splat(0.5));
         return Bounds { lo: unit.0, hi: unit.1, strays: 0, whole: unit };
     };
@@ -99,7 +99,7 @@ fn without_strays((scene, crowd): (&Scene, &Crowd), mut bounds: Bounds, mut slic
         }
         let Some(core) = slices.core() else { break };
         let kept = |part: &Part| bounds.contains(part.center) && slices.lies_in(&core, part.center);
-        let Some((lo, hi)) = hull(scene, Anisotropy::Crowd(crowd, &bounds), kept) else { break };
+        let Some((lo, hi)) = hull(scene, Granularity::Crowd(crowd, &bounds), kept) else { break };
         // Boxes of instances of a crowd may be too large.
         let (lo, hi) = (lo.max(bounds.lo), hi.min(bounds.hi));
         if (lo, hi) == (bounds.lo, bounds.hi) {
@@ -116,7 +116,7 @@ fn without_strays((scene, crowd): (&Scene, &Crowd), mut bounds: Bounds, mut slic
         1 => !bounds.contains(part.lo) || !bounds.contains(part.hi),
         _ => !bounds.contains(part.center),
     };
-    let parts = (scene, Anisotropy::Crowd(crowd, &bounds));
+    let parts = (scene, Granularity::Crowd(crowd, &bounds));
     let add = |n: &mut u64, part: &Part| *n += if outside(part) { part.faces } else { 0 };
     bounds.strays = gather(parts, || 0, add, |n, more| *n += more);
     if !crowd.is_empty() {
@@ -347,7 +347,7 @@ mod tests {
             Instance { name: String::new(), mesh: 0, world_from_object: DAffine3::from_translation(place) }
         };
         scene.instances = (0..400).map(place).collect();
-        let whole = hull(&scene, Anisotropy::Faces, |_| true).expect("there are faces");
+        let whole = hull(&scene, Granularity::Faces, |_| true).expect("there are faces");
         let bounds = Bounds { lo: whole.0, hi: whole.1, strays: 0, whole };
         let mut slices = Slices::new(&bounds);
         let nothing = slices.reached.covered();
@@ -413,7 +413,7 @@ mod tests {
     #[test]
     fn every_face_counts_once_whoever_counts_it() {
         for faces in [40, CHUNK, CHUNK + 1, 3 * CHUNK + 5] {
-            let counted = gather((&spiral(faces, 0.0), Anisotropy::Faces), || 0, |n, _| *n += 1, |n, more| *n += more);
+            let counted = gather((&spiral(faces, 0.0), Granularity::Faces), || 0, |n, _| *n += 1, |n, more| *n += more);
             assert_eq!(counted, 2 * faces, "two instances");
         }
     }

@@ -91,7 +91,7 @@ pub(super) struct Part {
 
 /// Which parts are looked at.
 #[derive(Clone, Copy)]
-pub(super) enum Anisotropy<'a> {
+pub(super) enum Granularity<'a> {
     /// Each face.
     Faces,
     /// Each face, but instances that are small in these bounds as one.
@@ -101,7 +101,7 @@ pub(super) enum Anisotropy<'a> {
 /// Box of the parts that `keep` wants; `None` when there are none.
 pub(super) fn hull(
     scene: &Scene,
-    anisotropy: Anisotropy,
+    granularity: Granularity,
     keep: impl Fn(&Part) -> bool + Sync,
 ) -> Option<(DVec3, DVec3)> {
     let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -111,7 +111,7 @@ pub(super) fn hull(
             join(all, (part.lo, part.hi));
         }
     };
-    let (lo, hi) = gather((scene, anisotropy), nothing, add, join);
+    let (lo, hi) = gather((scene, granularity), nothing, add, join);
     lo.cmple(hi).all().then_some((lo, hi))
 }
 
@@ -120,7 +120,7 @@ pub(super) const CHUNK: usize = 1 << 15;
 
 /// Adds up every face, sphere and cone with finite corners, from `nothing`; `join` adds what others have added up.
 pub(super) fn gather<T: Send>(
-    (scene, anisotropy): (&Scene, Anisotropy),
+    (scene, granularity): (&Scene, Granularity),
     nothing: impl Fn() -> T + Sync,
     add: impl Fn(&mut T, &Part) + Sync,
     join: impl Fn(&mut T, T),
@@ -128,7 +128,7 @@ pub(super) fn gather<T: Send>(
     let mut all = nothing();
     for instance in &scene.instances {
         let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
-        if let Anisotropy::Crowd(crowd, bounds) = anisotropy
+        if let Granularity::Crowd(crowd, bounds) = granularity
             && let Some(part) = crowd.part(instance, bounds)
         {
             add(&mut all, &part);

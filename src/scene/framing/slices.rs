@@ -2,7 +2,7 @@
 
 use super::bounds::Bounds;
 use super::crowd::Crowd;
-use super::parts::{Anisotropy, CHUNK, Part, gather};
+use super::parts::{CHUNK, Granularity, Part, gather};
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Instance, Mesh, Scene};
 use rayon::prelude::*;
@@ -56,7 +56,7 @@ impl Slices {
                 slices.weigh(part);
             }
         };
-        gather((scene, Anisotropy::Crowd(crowd, bounds)), || Self::new(bounds), add, Self::join)
+        gather((scene, Granularity::Crowd(crowd, bounds)), || Self::new(bounds), add, Self::join)
     }
 
     /// Adds what other slices of the same box have.

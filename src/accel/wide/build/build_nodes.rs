@@ -53,9 +53,9 @@ pub(super) struct TreeBuilder {
     pieces: Vec<Vec<BuildNode>>,
     /// The last piece, which build nodes are added to.
     open: Vec<BuildNode>,
-    /// Knots above the next one.
+    /// Build nodes above the next one.
     above: usize,
-    /// Knots on the longest way down.
+    /// Build nodes on the longest way down.
     depth: usize,
 }
 
@@ -169,7 +169,7 @@ pub(super) mod tests {
         [leaves(first), leaves(second)].concat()
     }
 
-    /// Knots on the longest way down.
+    /// Build nodes on the longest way down.
     pub(in super::super) fn depth(build_nodes: &[BuildNode]) -> usize {
         let (mut left, mut most) = (vec![(0, 1)], 0);
         while let Some((i, depth)) = left.pop() {
@@ -184,11 +184,11 @@ pub(super) mod tests {
 
     /// Adds a tree over so many leaves, of which the first has this number, cut anywhere, and shared where it has more than so
     /// many.
-    fn grow(growth: &mut TreeBuilder, first: u32, leaves: u32, shared: u32, seed: u64) {
+    fn grow(builder: &mut TreeBuilder, first: u32, leaves: u32, shared: u32, seed: u64) {
         let bounds =
             |first: u32, leaves: u32| Aabb { lo: Vec3::splat(first as f32), hi: Vec3::splat((first + leaves) as f32) };
         if leaves == 1 {
-            return growth.add(BuildNode::leaf(bounds(first, 1), first, 1));
+            return builder.add(BuildNode::leaf(bounds(first, 1), first, 1));
         }
         let mut random = crate::math::random::Random::new(seed ^ u64::from(first) << 32 ^ u64::from(leaves));
         // Every other cut takes off a leaf alone.
@@ -196,10 +196,10 @@ pub(super) mod tests {
         let sides = [(first, cut), (first + cut, leaves - cut)];
         let [a, b] = sides.map(|(first, leaves)| move |g: &mut TreeBuilder| grow(g, first, leaves, shared, seed));
         if leaves > shared {
-            growth.fork_shared(bounds(first, leaves), a, b);
+            builder.fork_shared(bounds(first, leaves), a, b);
         } else {
-            growth.begin(3);
-            growth.fork(bounds(first, leaves), a, b);
+            builder.begin(3);
+            builder.fork(bounds(first, leaves), a, b);
         }
     }
 
@@ -208,9 +208,9 @@ pub(super) mod tests {
         for seed in 0..20 {
             for count in [1, 2, 3, 700, 5000] {
                 let grown = |shared: u32| {
-                    let mut growth = TreeBuilder::default();
-                    grow(&mut growth, 0, count, shared, seed);
-                    growth.finish()
+                    let mut builder = TreeBuilder::default();
+                    grow(&mut builder, 0, count, shared, seed);
+                    builder.finish()
                 };
                 let (alone, deepest) = grown(u32::MAX);
                 assert!(leaves(&alone).into_iter().eq(0..count));

@@ -17,7 +17,7 @@ use crate::accel::wide::node::{Arrays, Child, Node, index};
 use crate::math::aabb::Aabb;
 use crate::math::simd::LANES;
 
-/// Knots that are worth a thread's while.
+/// Build nodes that are worth a thread's while.
 const PARALLEL: usize = 512;
 
 /// A subtree of at most this part of all build nodes is a piece. The same for every number of threads: so is the order of nodes.
@@ -31,7 +31,7 @@ const NEAR: f32 = 0.15;
 struct Plan {
     /// By one child at most, two, … seven: what all nodes below cost, as areas.
     costs: [f32; LANES - 1],
-    /// Knots below a build node, and itself; 0 of a leaf.
+    /// Build nodes below a build node, and itself; 0 of a leaf.
     build_nodes: u32,
     /// How many of two children, three, … eight, of a node of its own, stand for the first side; 0: one fewer will do.
     shares: [u8; LANES - 1],
@@ -144,7 +144,7 @@ struct Collapse<'k> {
     plans: &'k [Plan],
 }
 
-/// Knots that are children of one node: each with all below it.
+/// Build nodes that are children of one node: each with all below it.
 #[derive(Default)]
 struct Children {
     below: [Range<usize>; LANES],

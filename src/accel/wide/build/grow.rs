@@ -85,28 +85,28 @@ impl Grower {
         Self { lattice: Lattice::over(&bounds.aabb()), small_cell, leaf, area: bounds.area(), parallel }
     }
 
-    /// Adds the tree over some items, at least one, to `growth`; the same for every number of threads. `middles` is the box
+    /// Adds the tree over some items, at least one, to `builder`; the same for every number of threads. `middles` is the box
     /// around their doubled middles, where known.
-    pub(super) fn grow(&self, work: Work, bounds: Bounds, middles: Option<Bounds>, growth: &mut TreeBuilder) {
+    pub(super) fn grow(&self, work: Work, bounds: Bounds, middles: Option<Bounds>, builder: &mut TreeBuilder) {
         let count = work.prims.len();
         if count <= self.leaf as usize {
             if let Some(cut) = self.cut_large_leaf(work.items, &bounds) {
-                return self.fork(work, &cut, bounds, growth);
+                return self.fork(work, &cut, bounds, builder);
             }
             for (place, prim) in work.prims.iter_mut().zip(work.items.iter().flat_map(Item::prims)) {
                 *place = prim;
             }
             work.prims.sort_unstable();
-            return growth.add(BuildNode::leaf(bounds.aabb(), work.first, index(count)));
+            return builder.add(BuildNode::leaf(bounds.aabb(), work.first, index(count)));
         }
         if work.items.len() > self.small_cell
             && let Some(cell) = self.lattice.cell(work.items, self.leaf)
         {
             cell.sort(&self.lattice, work.items, work.spare);
-            return self.grow_cell(&cell, Cell::ALL, work.swapped(), bounds, growth);
+            return self.grow_cell(&cell, Cell::ALL, work.swapped(), bounds, builder);
         }
         let cut = cut_by_area(work.items, self.leaf, middles);
-        self.fork(work, &cut, bounds, growth);
+        self.fork(work, &cut, bounds, builder);
     }
 
     /// The cut of what fits into a leaf, where it is better than the leaf.
@@ -122,7 +122,7 @@ impl Grower {
     }
 
     /// Adds the build node of a cut, and all below.
-    fn fork(&self, work: Work, cut: &Cut, bounds: Bounds, growth: &mut TreeBuilder) {
+    fn fork(&self, work: Work, cut: &Cut, bounds: Bounds, builder: &mut TreeBuilder) {
         let (count, [first, second]) = (work.items.len(), cut.bounds);
         let middles = |part: usize| cut.middles.map(|both| both[part]);
         let (first_middles, second_middles) = (middles(0), middles(1));
@@ -130,22 +130,22 @@ impl Grower {
         self.join(
             count,
             bounds,
-            growth,
+            builder,
             |g| self.grow(a, first, first_middles, g),
             |g| self.grow(b, second, second_middles, g),
         );
     }
 
     /// Builds the subtree of some parts of a cell.
-    fn grow_cell(&self, cell: &Cell, parts: u8, work: Work, bounds: Bounds, growth: &mut TreeBuilder) {
-        let Some(first) = cell.cut(parts) else { return self.grow(work, bounds, None, growth) };
+    fn grow_cell(&self, cell: &Cell, parts: u8, work: Work, bounds: Bounds, builder: &mut TreeBuilder) {
+        let Some(first) = cell.cut(parts) else { return self.grow(work, bounds, None, builder) };
         let second = parts & !first;
         let count = work.items.len();
         let Count { items, prims } = cell.count(first);
         let [a, b] = work.split_at(items as usize, prims as usize);
         let grow_a = |g: &mut TreeBuilder| self.grow_cell(cell, first, a, cell.bounds(first), g);
         let grow_b = |g: &mut TreeBuilder| self.grow_cell(cell, second, b, cell.bounds(second), g);
-        self.join(count, bounds, growth, grow_a, grow_b);
+        self.join(count, bounds, builder, grow_a, grow_b);
     }
 
     /// Adds a build node over `count` items and its two sides, which are grown in parallel where it is worth it.
@@ -153,17 +153,17 @@ impl Grower {
         &self,
         count: usize,
         bounds: Bounds,
-        growth: &mut TreeBuilder,
+        builder: &mut TreeBuilder,
         first: impl FnOnce(&mut TreeBuilder) + Send,
         second: impl FnOnce(&mut TreeBuilder) + Send,
     ) {
         if count > self.parallel {
-            return growth.fork_shared(bounds.aabb(), first, second);
+            return builder.fork_shared(bounds.aabb(), first, second);
         }
         // Mostly more than there will be, and memory that nothing is written to costs nothing: to enlarge what is full stops all
         // threads. What is below has fewer items, and is not shared either.
-        growth.begin(count);
-        growth.fork(bounds.aabb(), first, second);
+        builder.begin(count);
+        builder.fork(bounds.aabb(), first, second);
     }
 }
 
@@ -180,12 +180,12 @@ mod tests {
     }
 
     fn grown_over(splitting: Splitting, mut items: Vec<Item>) -> (Vec<BuildNode>, Vec<u32>) {
-        let (mut spare, mut prims, mut growth) = (items.clone(), vec![0; items.len()], TreeBuilder::default());
+        let (mut spare, mut prims, mut builder) = (items.clone(), vec![0; items.len()], TreeBuilder::default());
         let bounds = crate::accel::wide::split::around(&items);
         let grower = Grower::new(splitting, items.len(), 1, &bounds, 8);
         let work = Work { items: &mut items, spare: &mut spare, prims: &mut prims, first: 0 };
-        grower.grow(work, bounds, None, &mut growth);
-        (growth.finish().0, prims)
+        grower.grow(work, bounds, None, &mut builder);
+        (builder.finish().0, prims)
     }
 
     #[test]

@@ -36,8 +36,8 @@ const RUN: u32 = 2;
 /// Items or leaves that one thread takes at a time.
 const CHUNK: usize = 1024;
 
-/// Knots that one thread takes at a time.
-const KNOTS: usize = 1 << 14;
+/// Build nodes that one thread takes at a time.
+const BUILD_NODES: usize = 1 << 14;
 
 /// How much more than twice as deep an improved tree may be: what is recursive must not run out of stack.
 const ROOM: usize = 32;
@@ -76,7 +76,7 @@ fn deepest(depth: usize) -> usize {
 /// A binary tree over all bounded prims.
 struct Binary {
     build_nodes: Vec<BuildNode>,
-    /// Knots on the longest way down.
+    /// Build nodes on the longest way down.
     depth: usize,
     /// The prims of leaves, in their order, triangles before others. A leaf holds triangles or other prims, never both.
     prims: Vec<u32>,
@@ -86,26 +86,26 @@ fn binary_tree(shapes: &Shapes, splitting: Splitting, times: usize) -> Binary {
     let first_other = index(shapes.triangles.len());
     let mut prims = vec![0; shapes.bounded() as usize];
     let (triangle_prims, other_prims) = prims.split_at_mut(shapes.triangles.len());
-    let grow = |items: Items, prims: &mut [u32], first: u32, leaf: u32, growth: &mut TreeBuilder| {
+    let grow = |items: Items, prims: &mut [u32], first: u32, leaf: u32, builder: &mut TreeBuilder| {
         let Items { mut all, bounds, middles } = items;
         // Pages that nothing was written to are made by the threads that write there.
         let spare = if splitting == Splitting::Octree { all.len() } else { 0 };
         let mut spare = bytemuck::zeroed_vec(spare);
         let grower = Grower::new(splitting, all.len(), times, &bounds, leaf);
-        grower.grow(Work { items: &mut all, spare: &mut spare, prims, first }, bounds, Some(middles), growth);
+        grower.grow(Work { items: &mut all, spare: &mut spare, prims, first }, bounds, Some(middles), builder);
     };
     let (triangles, others) = (Items::of_triangles(shapes), Items::of_others(shapes));
     let bounds = triangles.bounds.join(others.bounds).aabb();
     let lack = [&triangles, &others].map(|items| items.all.is_empty());
     let grow_triangles = |g: &mut TreeBuilder| grow(triangles, triangle_prims, 0, LANES as u32, g);
     let grow_others = |g: &mut TreeBuilder| grow(others, other_prims, first_other, RUN, g);
-    let mut growth = TreeBuilder::default();
+    let mut builder = TreeBuilder::default();
     match lack {
-        [false, false] => growth.fork_shared(bounds, grow_triangles, grow_others),
-        [false, true] => grow_triangles(&mut growth),
-        [true, _] => grow_others(&mut growth),
+        [false, false] => builder.fork_shared(bounds, grow_triangles, grow_others),
+        [false, true] => grow_triangles(&mut builder),
+        [true, _] => grow_others(&mut builder),
     }
-    let (build_nodes, depth) = growth.finish();
+    let (build_nodes, depth) = builder.finish();
     Binary { build_nodes, depth, prims }
 }
 
@@ -179,13 +179,13 @@ impl Leaves {
                 [blocks + block, runs + 1 - block]
             })
         };
-        let counts: Vec<[u32; 2]> = build_nodes.par_chunks(KNOTS).map(count).collect();
+        let counts: Vec<[u32; 2]> = build_nodes.par_chunks(BUILD_NODES).map(count).collect();
         let starts = counts.iter().scan([0, 0], |next, [blocks, runs]| {
             let start = *next;
             *next = [start[0] + blocks, start[1] + runs];
             Some(start)
         });
-        let chunks: Vec<(&mut [BuildNode], [u32; 2])> = build_nodes.chunks_mut(KNOTS).zip(starts).collect();
+        let chunks: Vec<(&mut [BuildNode], [u32; 2])> = build_nodes.chunks_mut(BUILD_NODES).zip(starts).collect();
         let lists: Vec<Self> = chunks.into_par_iter().map(|(c, start)| Self::list_from(start, c, triangles)).collect();
         let (blocks, runs) = lists.into_iter().map(|list| (list.blocks, list.runs)).unzip();
         Self { blocks: joined(blocks), runs: joined(runs) }

@@ -12,10 +12,10 @@ use crate::math::aabb::Aabb;
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
-/// Knots that are tried before it is asked whether that paid.
+/// Build nodes that are tried before it is asked whether that paid.
 const BATCH: usize = 256;
 
-/// Knots that one thread takes at a time.
+/// Build nodes that one thread takes at a time.
 const CHUNK: usize = 1 << 14;
 
 /// It paid if one in so many moved.
@@ -37,7 +37,7 @@ struct Links {
     links: Vec<Link>,
     /// Places still to be looked at: what is added above them, and the build node.
     open: Vec<(f32, u32)>,
-    /// Knots on the way up from one.
+    /// Build nodes on the way up from one.
     way: Vec<u32>,
 }
 
