@@ -198,7 +198,7 @@ impl SamplingArgs {
         })
     }
 
-    /// The samples of uniform sampling, and which rays pixels get. Errors are counted in what is said here; [`written`] says
+    /// The samples of uniform sampling, and which rays pixels get. Errors are counted in what is said here; [`Self::written`] says
     /// what that is for one picture.
     pub(super) fn sampling(&self, hints: &RenderHints) -> (u32, Sampling) {
         let usual = Settings::default().samples;

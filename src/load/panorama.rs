@@ -269,6 +269,7 @@ fn linear(picture: DynamicImage) -> Vec<[f32; 3]> {
     }
 }
 
+#[cfg(feature = "cli")]
 impl LoadedPanorama {
     /// Bytes that it takes, with what a picture makes of it.
     pub(crate) fn bytes(&self) -> u64 {

@@ -152,7 +152,7 @@ impl Sum {
         }
     }
 
-    /// A pixel from its samples: premultiplied RGBA, and its [`Picture::veil`].
+    /// A pixel from its samples: premultiplied RGBA, and its [`veil`](crate::image::Picture::veil).
     ///
     /// Alpha is one minus the share of the background that shows through. Coloured glass lets it through by channels; there
     /// is one alpha, so before a known background colour the least channel is left to it and what the others show more is the

@@ -64,6 +64,7 @@ mod wave;
 mod whitted;
 pub mod world;
 
+#[cfg(feature = "cli")]
 pub(crate) use adaptive::pixels_at_a_time as adaptive_pixels_at_a_time;
 pub use by_class::ByClass;
 pub use costs::{Cost, Costs, render_costs};

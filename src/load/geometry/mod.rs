@@ -1,6 +1,6 @@
 //! Geometry without a hierarchy -> scene: vertices, faces, points and lines, in runs that share a name and a material.
 //!
-//! The text of an OBJ leaves it ([`obj`](super::obj)), files of other formats hold nothing else ([`bare`]). It is centred in
+//! The text of an OBJ leaves it ([`obj`](super::obj)), files of other formats hold nothing else ([`plain_mesh`]). It is centred in
 //! `f64` and rounded ([`place`](super::place)), and becomes one mesh and one instance for each run (`assemble`), points and
 //! lines (`strokes`) get a width ([`wires`](super::wires)), materials come from the MTL files or pictures that it names
 //! ([`mtl`](super::mtl), `plain_mesh::pictures`); `finish` is the whole way.

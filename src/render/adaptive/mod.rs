@@ -21,7 +21,7 @@ use super::context::Context;
 use super::frame::Frame;
 use super::observer::Observer;
 use super::sampling::Adaptive;
-use super::tile::{TILE, Tile, TilePixels};
+use super::tile::{Tile, TilePixels};
 use super::whitted::Tracer;
 use crate::accel::Accel;
 use judge::Judge;
@@ -34,7 +34,9 @@ use std::sync::Mutex;
 const BAND: usize = 64;
 
 /// Pixels of a band in a picture so wide, of which all rays are kept at a time.
+#[cfg(feature = "cli")]
 pub(crate) fn pixels_at_a_time(width: u32) -> u64 {
+    use super::tile::TILE;
     let columns = u64::from(width.div_ceil(TILE)).max(1);
     u64::from(width) * (BAND as u64).div_ceil(columns) * u64::from(TILE)
 }

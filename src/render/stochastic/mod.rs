@@ -1,7 +1,7 @@
 //! Stochastic sampling of a tile: its pixels advance together in rounds, and only those that are not certain yet go into
 //! the next.
 //!
-//! What decides about a pixel are its own samples, and in the first rounds those of the pixels beside it ([`around`]): a
+//! What decides about a pixel are its own samples, and in the first rounds those of the pixels beside it ([`neighborhood`]): a
 //! pixel that happens to see nothing of what its neighbours see goes on with them. Pixels around the tile are therefore
 //! looked at in these rounds, too. Where pixels start with one sample, tiles share these ([`shared`]); all others are traced by
 //! this tile for itself, and counted: which there are depends on all of a tile, and no tile may wait for another to be done.
