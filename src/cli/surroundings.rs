@@ -9,6 +9,7 @@ use crate::load::paths::FileRead;
 use crate::load::{Limits, LoadError, Loaded};
 use crate::scene::default_light::{self, DefaultLight};
 use crate::scene::{Camera, Environment, LightKind, Scene};
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use xxhash_rust::xxh3::xxh3_128;
@@ -39,8 +40,15 @@ pub(super) fn place(look: &Look, limits: &Limits, loaded: &mut Loaded) -> Result
 }
 
 /// The panorama of `--env`, read once for all models of a command, and what a picture has prepared of it.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub(super) struct EnvRead(Arc<Mutex<Option<(PathBuf, LoadedPanorama)>>>);
+
+/// The same whatever was read: what is asked for is told apart by how it is written ([`up_to_date`](super::up_to_date)).
+impl fmt::Debug for EnvRead {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.debug_struct("EnvRead").finish_non_exhaustive()
+    }
+}
 
 impl EnvRead {
     /// Reads it, unless that was done already for another model that left as much memory.
@@ -119,6 +127,7 @@ mod tests {
         let limits = Limits::default();
         let first = read.panorama(&file, &limits).unwrap();
         std::fs::remove_file(&file).unwrap();
+        assert_eq!(format!("{read:?}"), format!("{:?}", EnvRead::default()), "what is asked for stays the same");
         let second = read.clone().panorama(&file, &limits).unwrap();
         assert!(Arc::ptr_eq(&first.panorama.texels, &second.panorama.texels) && first.hash == second.hash);
         assert_eq!(read.kept(), 64 * 32 * panorama::PER_PIXEL);

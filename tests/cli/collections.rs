@@ -1,6 +1,7 @@
 //! Whole folders of models, and pictures of them that are up to date.
 
 use super::program::{CUBE, Folder, Run, cube_with_a_bad_face, textured_cube};
+use meshray::image::{FileKind, Metadata, Output, Picture, encode};
 use std::path::MAIN_SEPARATOR;
 
 /// Three models in two folders, and what lies beside models.
@@ -183,6 +184,21 @@ fn what_a_model_reads_beside_its_own_file_counts_too() {
     std::fs::write(folder.path(map), library).unwrap();
     let run = update().ends(0);
     assert!(!run.stderr.contains("up to date"), "{}", run.stderr);
+    update().says(&["cube.png: is up to date"]);
+}
+
+#[test]
+fn pictures_under_a_panorama_are_up_to_date_as_long_as_that_is_the_same() {
+    let sky = |light: f32| {
+        let picture = Picture::of(4, 2, vec![[light, 0.2, 0.1, 1.0]; 8]);
+        encode(&picture, FileKind::Png, &Output::default(), &Metadata::default()).unwrap()
+    };
+    let folder = Folder::with_cube().file("sky.png", sky(0.5));
+    let update = || folder.render(&["cube.obj", "--env", "sky.png", "--update"]).ends(0);
+    assert!(!update().stderr.contains("up to date"));
+    update().says(&["cube.png: is up to date"]);
+    std::fs::write(folder.path("sky.png"), sky(0.9)).unwrap();
+    assert!(!update().stderr.contains("up to date"));
     update().says(&["cube.png: is up to date"]);
 }
 
