@@ -342,18 +342,26 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
     }
 }
 
+/// A map of lobes of the `i`th material, of so many textures: every other one lies as maps of its colour do not.
+fn lobe_map(textures: u32, i: usize, texture: u32) -> Option<TextureRef> {
+    let turned = UvTransform { scale: Vec2::new(2.0, -1.5), rotation: 0.7, ..UvTransform::default() };
+    let transform = if i.is_multiple_of(2) { UvTransform::default() } else { turned };
+    (textures > 0).then(|| TextureRef { texture: texture % textures, uv_set: (i % 2) as u32, transform })
+}
+
+/// The metallic-rough materials of a stage.
+fn metal_roughs(s: &mut Stage) -> impl Iterator<Item = &mut MetalRough> {
+    s.scene.materials.iter_mut().filter_map(|material| match &mut material.reflection {
+        Reflection::MetalRough(m) => Some(m),
+        Reflection::Phong(_) | Reflection::Unlit => None,
+    })
+}
+
 /// `s` with more lobes over what is metallic-rough, one or several each: their maps and those of reflectance are of so many
 /// textures.
 fn lobed(mut s: Stage, textures: u32) -> Stage {
-    let turned = UvTransform { scale: Vec2::new(2.0, -1.5), rotation: 0.7, ..UvTransform::default() };
-    let map = |i: usize, texture: u32| {
-        let transform = if i.is_multiple_of(2) { UvTransform::default() } else { turned };
-        (textures > 0).then(|| TextureRef { texture: texture % textures, uv_set: (i % 2) as u32, transform })
-    };
-    let matters = s.scene.materials.iter_mut().filter_map(|material| match &mut material.reflection {
-        Reflection::MetalRough(m) => Some(m),
-        Reflection::Phong(_) | Reflection::Unlit => None,
-    });
+    let map = |i, texture| lobe_map(textures, i, texture);
+    let matters = metal_roughs(&mut s);
     let mut panes = 0;
     for (i, m) in matters.enumerate() {
         let has = |lobe: usize| i == lobe || i == lobe + 1 || i >= 5;
@@ -416,15 +424,8 @@ fn lobes_shaded_side_by_side_have_the_bits_of_lobes_shaded_one_by_one() {
 /// `s` with sheen and clear coat alone over what is metallic-rough, one or both, smooth and rough, their maps of so many
 /// textures.
 fn overlaid(mut s: Stage, textures: u32) -> Stage {
-    let turned = UvTransform { scale: Vec2::new(2.0, -1.5), rotation: 0.7, ..UvTransform::default() };
-    let map = |i: usize, texture: u32| {
-        let transform = if i.is_multiple_of(2) { UvTransform::default() } else { turned };
-        (textures > 0).then(|| TextureRef { texture: texture % textures, uv_set: (i % 2) as u32, transform })
-    };
-    let matters = s.scene.materials.iter_mut().filter_map(|material| match &mut material.reflection {
-        Reflection::MetalRough(m) => Some(m),
-        Reflection::Phong(_) | Reflection::Unlit => None,
-    });
+    let map = |i, texture| lobe_map(textures, i, texture);
+    let matters = metal_roughs(&mut s);
     for (i, m) in matters.enumerate() {
         (m.specular_map, m.specular_color_map) = (None, None);
         m.coat = (i % 3 != 0).then(|| {
