@@ -40,6 +40,16 @@ struct Ruler {
     scale: Vec4,
 }
 
+/// Where a set is cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Place {
+    axis: usize,
+    /// The first of the second part.
+    bin: usize,
+    /// What both parts cost.
+    cost: f32,
+}
+
 impl Ruler {
     fn over(middles: &Bounds, bins: usize) -> Self {
         // A little less than all bins, so that the last middle is in the last one.
@@ -50,6 +60,12 @@ impl Ruler {
         let extent = middles.hi - middles.lo;
         let scale = Vec4::new(per_unit(extent.x), per_unit(extent.y), per_unit(extent.z), 0.0);
         Self { lo: middles.lo, scale }
+    }
+
+    /// The axis on which middles lie farthest apart.
+    fn longest_axis(&self) -> usize {
+        let scale = self.scale.to_array().map(|scale| if scale > 0.0 { scale } else { f32::INFINITY });
+        (1..3).fold(0, |longest, axis| if scale[axis] < scale[longest] { axis } else { longest })
     }
 
     /// The bins of an item on the three axes, plus [`TO_INTEGER`].
@@ -99,8 +115,8 @@ impl<const N: usize> Bins<N> {
         }
     }
 
-    /// The axis and the first bin of the second part. What an empty part costs is no number, and never less.
-    fn cheapest(&self, leaf: u32) -> Option<(usize, usize)> {
+    /// What an empty part costs is no number, and never less.
+    fn cheapest(&self, leaf: u32) -> Option<Place> {
         let mut after = [Vec4::ZERO; N];
         let mut part = Sides::EMPTY;
         for i in (1..N).rev() {
@@ -119,11 +135,12 @@ impl<const N: usize> Bins<N> {
         }
         let axes = (0..3).filter(|&k| at[k] > 0);
         // The first of equals.
-        axes.reduce(|a, b| if least[b] < least[a] { b } else { a }).map(|axis| (axis, usize::from(at[axis])))
+        let axis = axes.reduce(|a, b| if least[b] < least[a] { b } else { a })?;
+        Some(Place { axis, bin: usize::from(at[axis]), cost: least[axis] })
     }
 
-    fn parts(&self, axis: usize, place: usize) -> [Bounds; 2] {
-        let (first, second) = self.bounds.split_at(place);
+    fn parts(&self, axis: usize, bin: usize) -> [Bounds; 2] {
+        let (first, second) = self.bounds.split_at(bin);
         [first, second].map(|bins| bins.iter().fold(Bounds::EMPTY, |b, bin| b.join(bin[axis])))
     }
 }
@@ -176,18 +193,22 @@ fn cut_in<const N: usize>(items: &mut [Item], leaf: u32, middles: Option<Bounds>
     } else {
         bins.add(items.iter(), &ruler);
     }
-    let Some((axis, place)) = bins.cheapest(leaf) else { return halves(items) };
-
+    let (axis, bin) = match bins.cheapest(leaf) {
+        None => return halves(items),
+        // Boxes without any area, of prims on a line or so small that it underflows: all cuts cost as little.
+        Some(Place { cost: 0.0, .. }) => (ruler.longest_axis(), N / 2),
+        Some(Place { axis, bin, .. }) => (axis, bin),
+    };
     #[expect(clippy::cast_precision_loss, reason = "a few bins")]
-    let second = Vec4::splat(TO_INTEGER + place as f32);
+    let second = Vec4::splat(TO_INTEGER + bin as f32);
     let is_first = |item: &Item| ruler.place(item).cmplt(second).bitmask() >> axis & 1 == 1;
     let cut = if many {
         shared_partition(items, &is_first)
     } else {
-        let prims = bins.counts[..place].iter().map(|counts| counts[axis]).sum::<i32>().cast_unsigned() as usize;
-        Cut { at: partition(items, is_first), prims, bounds: bins.parts(axis, place), middles: None }
+        let prims = bins.counts[..bin].iter().map(|counts| counts[axis]).sum::<i32>().cast_unsigned() as usize;
+        Cut { at: partition(items, is_first), prims, bounds: bins.parts(axis, bin), middles: None }
     };
-    // Only where boxes are so large that differences of places overflow is one part empty.
+    // Only where differences of places overflow, or their parts of a bin, is one part empty.
     if cut.at == 0 || cut.at == items.len() { halves(items) } else { cut }
 }
 
@@ -243,20 +264,20 @@ mod tests {
     use crate::math::random::Random;
 
     /// The cheapest cut by its definition: axis by axis, place by place, the boxes of both parts made anew.
-    fn defined<const N: usize>(bins: &Bins<N>, leaf: u32) -> Option<(usize, usize)> {
-        let mut best = (f32::INFINITY, None);
+    fn defined<const N: usize>(bins: &Bins<N>, leaf: u32) -> Option<Place> {
+        let mut best: Option<Place> = None;
         for axis in 0..3 {
-            for place in 1..N {
-                let counts = [0..place, place..N].map(|part| bins.counts[part].iter().map(|c| c[axis]).sum::<i32>());
-                let [a, b] = bins.parts(axis, place);
+            for bin in 1..N {
+                let counts = [0..bin, bin..N].map(|part| bins.counts[part].iter().map(|c| c[axis]).sum::<i32>());
+                let [a, b] = bins.parts(axis, bin);
                 let cost =
                     a.area() * weight(counts[0], leaf.cast_signed()) + b.area() * weight(counts[1], leaf.cast_signed());
-                if cost < best.0 {
-                    best = (cost, Some((axis, place)));
+                if cost < best.map_or(f32::INFINITY, |best| best.cost) {
+                    best = Some(Place { axis, bin, cost });
                 }
             }
         }
-        best.1
+        best
     }
 
     fn assert_cheapest_is_as_defined<const N: usize>(items: &[Item], leaf: u32) {
@@ -280,6 +301,27 @@ mod tests {
                 let prims = items[..cut.at].iter().flat_map(Item::prims).count();
                 assert_eq!(cut.prims, prims, "{count} {shape}");
                 assert!(items.iter().flat_map(Item::prims).count() == count as usize);
+            }
+        }
+    }
+
+    #[test]
+    fn sets_without_area_are_cut_in_the_middle() {
+        let mut random = Random::new(3);
+        for (shape, size) in [(Vec3::new(0.0, 1.0, 0.0), 0.0), (Vec3::new(1e-25, 3e-25, 2e-25), 1e-27)] {
+            for count in [10, 300, 3 * MANY as u32] {
+                let mut item = |prim| {
+                    let at = random.cube() * shape;
+                    Item::new(Aabb { lo: at, hi: at + Vec3::splat(size) }, prim)
+                };
+                let mut items: Vec<Item> = (0..count).map(&mut item).collect();
+                let cut = cut_by_area(&mut items, 8, None);
+                let part = cut.at as f32 / count as f32;
+                assert!((0.2..0.8).contains(&part), "{count}: {part}");
+                let y = |item: &Item| item.bounds().lo.y;
+                let (first, second) = items.split_at(cut.at);
+                let most = first.iter().map(y).fold(f32::MIN, f32::max);
+                assert!(second.iter().all(|item| y(item) > most - shape.y / 1000.0), "{count}");
             }
         }
     }
