@@ -3,8 +3,8 @@
 //! MTL has many careless writers. Under [`MtlMode::Guess`] the values that no one can have meant are replaced, each with
 //! a counted warning; under [`MtlMode::Literal`] the text counts. Both agree on this: colours are linear (the founding
 //! texts know nothing else, and Blender writes them so; [`super::writer`] tells when they are guessed not to be) and pictures
-//! sRGB-coded; surfaces are seen from both sides; `illum` 3 and above mirror by `Ks`, of these 4, 6, 7 and 9 are transparent,
-//! 5 and 7 have Fresnel's balance; a material with fields of physically based rendering (`Pr`, `Pm`, …) is one, and its `Ks`
+//! sRGB-coded; surfaces are seen from both sides; `illum` 3 and above mirror by `Ks`, of these 4, 6, 7 and 9 are transparent
+//! and let through what they do not mirror, 5 and 7 have Fresnel's balance; a material with fields of physically based rendering (`Pr`, `Pm`, …) is one, and its `Ks`
 //! is not used.
 //!
 //! The numbers come first ([`Meaning`]), then the pictures ([`super::textures`]): what a factor means may depend on
@@ -277,11 +277,15 @@ impl Meaning<'_> {
         let fresnel = matches!(illum, 5 | 7);
         // Fresnel's balance needs something to balance: glass mirrors what it does not let through.
         let mirror = if mirrors && glass && fresnel && ks == Vec3::ZERO && self.guessing() { transmission } else { ks };
+        let mirror = if mirrors { mirror } else { Vec3::ZERO };
+        // What is mirrored does not pass. Fresnel finds what is by the angle, and a map by the place.
+        let is_even = !fresnel && !(self.has_map)(Slot::Specular);
+        let transmission = if is_even { transmission * (Vec3::ONE - mirror) } else { transmission };
         Phong {
             ambient: self.ambient(kd),
             specular,
             shininess,
-            mirror: if mirrors { mirror } else { Vec3::ZERO },
+            mirror,
             transmission,
             ior: self.ior(glass),
             fresnel,

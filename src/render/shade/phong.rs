@@ -5,8 +5,8 @@
 
 use super::{BounceWeights, Reader};
 use crate::math::Vec3;
+use crate::render::media::Crossing;
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, reflect};
-use crate::render::wave::Crossing;
 use crate::scene::Phong;
 
 /// Phong's parameters at one point.
@@ -146,8 +146,10 @@ impl PhongBsdf {
         if self.fresnel && self.mirror != Vec3::ZERO { schlick } else { self.mirror }
     }
 
-    /// Without Fresnel the weights are the material's own, and total reflection adds what cannot pass to the mirror.
-    /// With it an opaque surface reflects more at grazing angles (Schlick), and a transparent one splits the light by
+    /// Without Fresnel the weights are the material's own, but what lets light in lets through no more than it does not mirror:
+    /// where all branches of a ray together weighed more than it, they would have no end. Total reflection adds what cannot
+    /// pass to the mirror.
+    /// With Fresnel an opaque surface reflects more at grazing angles (Schlick), and a transparent one splits the light by
     /// the exact formula for dielectrics.
     pub(super) fn bounce_weights(&self, cosine: f32, crossing: &Crossing) -> BounceWeights {
         let share = fresnel_dielectric(f64::from(cosine), f64::from(crossing.n_i), f64::from(crossing.n_t));
@@ -158,7 +160,11 @@ impl PhongBsdf {
             (false, true) if share == 1.0 && crossing.n_i > crossing.n_t => {
                 BounceWeights::smooth((self.mirror + self.transmission).min(Vec3::ONE), Vec3::ZERO)
             }
-            (false, _) => BounceWeights::smooth(self.mirror, self.transmission),
+            (false, true) => {
+                let mirror = self.mirror.min(Vec3::ONE);
+                BounceWeights::smooth(mirror, self.transmission.min(Vec3::ONE - mirror))
+            }
+            (false, false) => BounceWeights::smooth(self.mirror, Vec3::ZERO),
             (true, false) => BounceWeights::smooth(self.reflected(cosine), Vec3::ZERO),
             (true, true) => {
                 // Inside, what is turned back has been let in before and is not the mirror's to weaken.
@@ -173,7 +179,7 @@ impl PhongBsdf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::wave::{Media, Medium};
+    use crate::render::media::{Media, MediaTable, Medium};
 
     fn bsdf() -> PhongBsdf {
         PhongBsdf {
@@ -194,8 +200,10 @@ mod tests {
         Vec3::new(sin, 0.0, cos)
     }
 
+    const GLASS: Medium = Medium { material: 0, ior: 1.5 };
+
     fn into_glass() -> Crossing {
-        Media::default().cross(Medium { material: 0, ior: 1.5 }, true)
+        MediaTable::default().cross(Media::OUTSIDE, GLASS, true)
     }
 
     #[test]
@@ -225,7 +233,7 @@ mod tests {
         assert!((through(refracted) - 0.75).abs() < 1e-5);
         assert!(through(refracted - 10.0) < 0.75 && through(refracted + 10.0) < 0.75);
         assert_eq!(through(20.0), 0.0, "a light on the viewer's side is not seen through");
-        let same = Media::default().cross(Medium { material: 0, ior: 1.0 }, true);
+        let same = MediaTable::default().cross(Media::OUTSIDE, Medium { material: 0, ior: 1.0 }, true);
         assert_eq!(bsdf().lit_through(Vec3::Z, at(-40.0), at(160.0), &same), Vec3::ZERO);
     }
 
@@ -237,7 +245,9 @@ mod tests {
 
     #[test]
     fn total_reflection_loses_nothing() {
-        let out = into_glass().beyond.cross(Medium { material: 0, ior: 1.5 }, false);
+        let mut table = MediaTable::default();
+        let within = table.reset(&[GLASS]);
+        let out = table.cross(within, GLASS, false);
         for fresnel in [false, true] {
             let glass = PhongBsdf { fresnel, mirror: Vec3::ZERO, transmission: Vec3::ONE, ..bsdf() };
             assert_eq!(glass.bounce_weights(0.1, &out), BounceWeights::smooth(Vec3::ONE, Vec3::ZERO));

@@ -294,25 +294,38 @@ fn a_hundred_plates_of_glass_shift_a_ray_and_leave_its_direction() {
     assert!((far - near - 8.0 * tangent(sine)).abs() < 200.0 * ulp * 8.0, "{far} {near}");
 }
 
-/// S12 (nesting): water in a glass shell in air, each boundary with the indices of its two sides.
-#[test]
-fn water_within_glass_bends_as_snells_law_says_at_every_boundary() {
-    // Layers that fill the space between spheres of radius 2 and 1 and the inner one. A ray beside the middle.
-    let impact = 0.6f64;
+/// Where a ray 0.3 beside the middle of spheres within each other, (radius, index) from the outermost on, meets a plane 6 below it:
+/// what is seen there, and what should be; and how many rays were refracted.
+fn through_spheres(spheres: &[(f64, f32)]) -> (f64, f64, u64) {
+    let impact = 0.3f64;
     let mut s = looking_down(5.0);
     let (eye, at) = (DVec3::new(impact, 0.0, 5.0), DVec3::new(impact, 0.0, 0.0));
     s.view = View::look_at(eye, at, DVec3::Y, Lens::orthographic(1e-6));
-    s.sphere(DVec3::ZERO, 2.0, glass(1.5)).sphere(DVec3::ZERO, 1.0, glass(1.33));
+    for &(radius, ior) in spheres {
+        s.sphere(DVec3::ZERO, radius, glass(ior));
+    }
     s.mesh(ruler(-6.0, 8.0), DAffine3::IDENTITY, unlit(Vec3::ONE));
     // n r sin θ is constant along the way through spheres around one centre (P. Bouguer, 1729).
-    let angle = |n: f64, r: f64| libm::asin(impact / (n * r));
-    let turned = 2.0 * (angle(1.0, 2.0) - angle(1.5, 2.0) + angle(1.5, 1.0) - angle(1.33, 1.0));
+    let angle = |n: f32, r: f64| libm::asin(impact / (f64::from(n) * r));
+    let outside = std::iter::once(1.0).chain(spheres.iter().map(|&(_, ior)| ior));
+    let turned = |(n, &(r, ior)): (f32, &(f64, f32))| 2.0 * (angle(n, r) - angle(ior, r));
+    let turned: f64 = outside.zip(spheres).map(turned).sum();
     // The way is symmetric: it comes out at distance `impact` from the line through the centre turned by that angle.
-    let (sin, cos) = (libm::sin(turned), libm::cos(turned));
-    let x = (impact - 6.0 * sin) / cos;
-    let found = f64::from(s.color().x) * 16.0 - 8.0;
-    assert!((found - x).abs() < 1e-4, "{found} for {x}");
-    assert_eq!(s.render().counts.refracted.queries, 4);
+    let x = (impact - 6.0 * libm::sin(turned)) / libm::cos(turned);
+    (f64::from(s.color().x) * 16.0 - 8.0, x, s.render().counts.refracted.queries)
+}
+
+/// S12 (nesting): each boundary has the indices of its two sides, however deep it lies.
+#[test]
+fn bodies_within_bodies_bend_as_snells_law_says_at_every_boundary() {
+    // Water in a glass shell in air; and a dozen bodies, of kinds that alternate and of one.
+    let spheres = |ior: [f32; 2]| (0..12).map(move |i| (2.0 - 0.1 * f64::from(i), ior[i as usize % 2]));
+    let water = vec![(2.0, 1.5), (1.0, 1.33)];
+    for spheres in [water, spheres([1.5, 1.1]).collect(), spheres([1.3, 1.3]).collect()] {
+        let (found, x, refracted) = through_spheres(&spheres);
+        assert!((found - x).abs() < 1e-4, "{found} for {x}: {spheres:?}");
+        assert_eq!(refracted, 2 * spheres.len() as u64);
+    }
 }
 
 /// S15 (furnace): what smooth glass and mirrors reflect and transmit adds up to what there is.
@@ -334,6 +347,25 @@ fn glass_and_mirrors_in_an_evenly_bright_room_cannot_be_seen() {
         // What is still inside after so many bounces, where it grazes the ball, is left in the dark.
         assert_near(Vec3::from_slice(pixel), Vec3::ONE, 1e-6 * depth as f32);
     }
+}
+
+#[test]
+fn glass_that_mirrors_and_passes_all_light_at_once_has_no_endless_tree_of_rays() {
+    let all = Phong { transmission: Vec3::ONE, mirror: Vec3::splat(0.9), ior: 1.5, ..phong() };
+    let mut s = looking_down(5.0);
+    s.view = View::look_at(DVec3::new(0.3, 0.1, 5.0), DVec3::new(0.3, 0.1, 0.0), DVec3::Y, Lens::orthographic(2.0));
+    for i in 0..8 {
+        let corner = |k: i32| f64::from(i >> k & 1) * 2.1 - 1.05;
+        s.sphere(DVec3::new(corner(0), corner(1), corner(2)), 1.0, material(Vec3::ZERO, all.clone()));
+    }
+    s.scene.environment = Environment::Constant(Vec3::ONE);
+    s.settings = Settings { depth: Some(256), width: 4, height: 4, ..s.settings };
+    let rendered = s.render();
+    let rays = rendered.counts.refracted.queries + rendered.counts.reflected.queries;
+    assert!(rays > 1000 && rays < 100_000, "{rays}");
+    // Less is seen than there is by what the ends of branches leave in the dark.
+    let seen = |p: &[f32; 4]| (0.5..1.0 + 1e-5).contains(&p[0]);
+    assert!(rendered.picture.beauty.iter().all(seen), "{:?}", rendered.picture.beauty);
 }
 
 /// A square of glass whose inside lies above it: it is left there.

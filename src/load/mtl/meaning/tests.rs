@@ -79,7 +79,7 @@ fn dissolve_blends_unless_illum_or_a_filter_makes_it_glass() {
     let (m, _) = guess("Kd 1 1 1\nd 0.25\nillum 6\nNi 1.52\nKs 0.1 0.1 0.1\nNs 9");
     assert_eq!((m.opacity, m.alpha_mode, m.base_color), (1.0, AlphaMode::Opaque, Vec3::splat(0.25)));
     let p = phong(&m);
-    assert_eq!((p.transmission, p.mirror, p.ior, p.fresnel), (Vec3::splat(0.75), Vec3::splat(0.1), 1.52, false));
+    assert_eq!((p.transmission, p.mirror, p.ior, p.fresnel), (Vec3::splat(0.675), Vec3::splat(0.1), 1.52, false));
 
     let (m, _) = guess("Kd 0 0 0\nTf 1 0.5 0\nillum 2\nNi 1.5");
     assert_eq!(phong(&m).transmission, Vec3::new(1.0, 0.5, 0.0));
@@ -87,6 +87,20 @@ fn dissolve_blends_unless_illum_or_a_filter_makes_it_glass() {
     let (m, warnings) = guess("Kd 0 0 0\nTf 1 0.5 0\nillum 7\nd 0.5");
     assert_eq!((phong(&m).transmission, phong(&m).ior), (Vec3::new(0.5, 0.25, 0.0), 1.5));
     assert_eq!(warnings, ["mtl-no-ior"]);
+}
+
+#[test]
+fn glass_lets_through_what_it_does_not_mirror() {
+    for (text, passed) in [
+        ("illum 6\nTf 1 0.5 0", Vec3::new(0.75, 0.25, 0.0)),
+        ("illum 4\nd 0.5", Vec3::new(0.375, 0.25, 0.0)),
+        ("illum 2\nTf 1 0.5 0", Vec3::new(1.0, 0.5, 0.0)),
+        ("illum 7\nTf 1 0.5 0", Vec3::new(1.0, 0.5, 0.0)),
+    ] {
+        let text = format!("Kd 0 0 0\nKs 0.25 0.5 1\nNs 9\nNi 1.5\n{text}");
+        assert_eq!(phong(&guess(&text).0).transmission, passed, "{text}");
+        assert_eq!(phong(&literal(&text)).transmission, passed, "{text}");
+    }
 }
 
 #[test]
