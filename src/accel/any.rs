@@ -33,7 +33,7 @@ pub enum AccelKind {
     GridBvh,
     /// One cell refined by an octree, with a mailbox.
     Octree,
-    /// The same cuts as boxes in nodes of eight; small cells are cut by surface area.
+    /// Boxes in nodes of eight, cut by the planes of an octree; small cells are cut by surface area.
     FastOctree,
     /// Boxes in nodes of eight, cut by surface area.
     FastBvh,

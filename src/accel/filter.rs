@@ -37,7 +37,7 @@ pub(super) fn those(rays: u32, is_true: impl Fn(usize) -> bool) -> u32 {
 pub struct HitQueries<'w> {
     /// The rays.
     pub rays: &'w [Ray],
-    /// The same rays as a pencil, if all start at one place: packets read them there.
+    /// The rays as a pencil, if all start at one place: packets read them there.
     pub pencil: Option<&'w Pencil<'w>>,
     /// For rays that go on behind a hit: that hit of each.
     pub after: Option<&'w [Hit]>,

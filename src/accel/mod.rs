@@ -94,7 +94,7 @@ impl Ray {
         [from, to]
     }
 
-    /// The other way round.
+    /// A ray from two rows of four numbers.
     #[inline(always)]
     pub(crate) fn from_fours(numbers: [[f32; 4]; 2], exclude: u32, sample: u32) -> Self {
         bytemuck::cast(RayWords { numbers, others: [exclude, sample] })
@@ -137,7 +137,7 @@ impl Hit {
         bytemuck::cast_ref(self)
     }
 
-    /// The other way round, of some.
+    /// Hits from rows of four numbers.
     #[inline(always)]
     pub(crate) fn from_fours<const N: usize>(fours: [[f32; 4]; N]) -> [Self; N] {
         fours.map(bytemuck::cast)

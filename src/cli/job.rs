@@ -98,7 +98,7 @@ pub(super) struct Shot {
     pub step: Step,
     /// Written to where.
     pub target: Target,
-    /// As what.
+    /// What kind of file it is.
     pub kind: FileKind,
     /// Whether folders are made for it.
     pub growth: Growth,

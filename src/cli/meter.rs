@@ -35,12 +35,12 @@ pub(super) struct Metered {
 }
 
 impl Metered {
-    /// Those of a view.
+    /// The stops of a view, where they are known.
     pub(super) fn get(&self, view: &Choice) -> Option<f32> {
         self.stops.iter().find(|(known, _)| known == view).map(|(_, stops)| *stops)
     }
 
-    /// The same, found where they are not known, and known from then on; `None` where nothing tells.
+    /// The stops of a view, found where they are not known, and known from then on; `None` where nothing tells.
     pub(super) fn get_or_find(&mut self, view: &Choice, find: impl FnOnce() -> Option<f32>) -> Option<f32> {
         self.get(view).or_else(|| {
             let start = Instant::now();

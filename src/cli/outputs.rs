@@ -24,7 +24,7 @@ pub(super) enum Target {
 }
 
 impl Target {
-    /// The same, but of what lies in one of these folders only a picture that meshray wrote is replaced.
+    /// A target of which, in one of these folders, only a picture that meshray wrote is replaced.
     pub(super) fn spares_beside(self, folders: &HashSet<PathBuf>) -> Self {
         match self {
             Self::Named(path) if !folders.is_empty() && folders.contains(&folder_of(&path)) => Self::Default(path),

@@ -58,7 +58,7 @@ pub(super) fn vec3(text: &str) -> Result<[f64; 3], String> {
     }
 }
 
-/// The same, not all 0.
+/// A direction: three finite numbers, not all 0.
 pub(super) fn direction(text: &str) -> Result<[f64; 3], String> {
     let direction = vec3(text)?;
     if direction == [0.0; 3] {

@@ -72,9 +72,9 @@ pub(super) fn wide_in_pixels(narrowest: f64, size: f64, settings: &Settings) -> 
 }
 
 impl Effective {
-    /// The same for a picture of a scene that is written as this kind of file: errors are counted in what it holds. Measured
-    /// lamps are shown by exposures of many stops; the walls of the studio, which stand for no place, are not to turn black or
-    /// white by them.
+    /// Adapts the settings to the kind of file that a picture of a scene is written as: errors are counted in what it holds.
+    /// Measured lamps are shown by exposures of many stops; the walls of the studio, which stand for no place, are not to turn
+    /// black or white by them.
     pub(super) fn written_as(&mut self, look: &Look, scene: &Scene, kind: FileKind) {
         if scene.photometric && kind != FileKind::Exr {
             self.settings.walls = libm::exp2f(-self.output.exposure);
@@ -82,7 +82,7 @@ impl Effective {
         self.settings.sampling = look.sampling.written(self.settings.sampling, kind, &self.output);
     }
 
-    /// The same for a picture of a model about so large that has points or lines so narrow, world units.
+    /// Adapts the sampling to a model about so large that has points or lines so narrow, world units.
     pub(super) fn of_wires(&mut self, look: &Look, narrowest: f64, size: f64) {
         let pixels = wide_in_pixels(narrowest, size, &self.settings);
         self.settings.sampling = look.sampling.of_wires(self.settings.sampling, pixels);
@@ -200,7 +200,7 @@ pub(super) fn too_large(effective: &Effective, kind: FileKind, behind: Behind, l
     beyond((settings.width, settings.height), bytes(effective, kind, behind), limit)
 }
 
-/// The same of a picture that is judged, and of which nothing is kept but what its pixels cost.
+/// A picture that takes more memory than is allowed to be judged, when nothing is kept but what its pixels cost.
 pub(super) fn too_large_to_judge((width, height): (u32, u32), limit: u64) -> Option<Diagnostic> {
     /// Light, counts, and both once more of what it is compared with.
     const OF_PIXEL: u64 = 64;

@@ -52,7 +52,7 @@ pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exi
     Ok(loaded)
 }
 
-/// The same for a command that does not need each instance by itself.
+/// Loads a model for a command that does not need each instance by itself.
 pub(super) fn model_as_stored(input: &PathBuf, args: &LoadArgs, messages: &Messages) -> Result<Loaded, Exit> {
     let moment = moment::moment(&args.moment).map_err(|wrong| messages.wrong(wrong))?;
     let options = LoadOptions { moment, ..args.options() };
@@ -68,7 +68,7 @@ pub(super) fn check_flattened(loaded: &Loaded, limit: u64, file: &Path) -> Resul
     check_stored((loaded, bytes), limit, file, "raise --max-memory")
 }
 
-/// The same where those that are stored by themselves, all of them or some, take so many bytes.
+/// Refuses a scene whose stored instances, all of them or some, take more bytes than are allowed.
 pub(super) fn check_stored(
     (loaded, bytes): (&Loaded, u64),
     limit: u64,

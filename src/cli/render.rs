@@ -103,7 +103,7 @@ impl SoFar {
         }
     }
 
-    /// The same for one input among others that are rendered beside it.
+    /// The state of one input among others that are rendered beside it.
     pub(super) fn of_one(&self) -> Self {
         Self::new(self.sources.clone())
     }

@@ -111,7 +111,7 @@ pub(super) enum Aa {
 /// one ray of each shows the same tells nothing.
 const FEWEST_OF_LENS: u32 = 16;
 
-/// The same where points and lines are narrower than so many pixels: one ray in each pixel may pass them all.
+/// Samples of a pixel at least where points and lines are narrower than so many pixels: one ray in each may pass them all.
 const FEWEST_OF_WIRES: u32 = 16;
 const NARROW: f64 = 2.0;
 
@@ -234,7 +234,7 @@ impl SamplingArgs {
         }
     }
 
-    /// The same sampling for a picture of points and lines about so many pixels wide.
+    /// What a picture of points and lines about so many pixels wide is sampled like.
     pub(super) fn of_wires(&self, sampling: Sampling, pixels: f64) -> Sampling {
         match sampling {
             Sampling::Stochastic(how) if self.min_samples.is_none() => {
@@ -245,7 +245,7 @@ impl SamplingArgs {
         }
     }
 
-    /// The same sampling for a picture that is written as this kind of file, developed like that.
+    /// What a picture that is written as this kind of file, developed like that, is sampled like.
     pub(super) fn written(&self, sampling: Sampling, kind: FileKind, output: &Output) -> Sampling {
         let linear = match self.error_space {
             Some(space) => space == SpaceArg::Linear,

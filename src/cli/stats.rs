@@ -153,7 +153,7 @@ fn parameters(kind: AccelKind, params: &AccelParams) -> Value {
 /// Everything about one picture.
 pub(super) struct PictureStats {
     json: Value,
-    /// The same for people, without all settings.
+    /// The statistics for people, without all settings.
     text: String,
 }
 

@@ -65,7 +65,7 @@ fn is_still_meant(input: &Path, files: &Map<String, Value>) -> bool {
     }
 }
 
-/// The same once the model is loaded.
+/// Whether the picture that is there was made of what is loaded now.
 pub(super) fn is_as_loaded(job: &RenderJob, batch: &Batch, shot: &Shot, loaded: &Loaded) -> bool {
     let made_of = made_of(job, batch, shot, loaded);
     made_of.is_some() && made_of == carried(shot)

@@ -46,7 +46,7 @@ impl Sources {
         Ok(())
     }
 
-    /// The same for where a picture goes.
+    /// Refuses a picture that would go where one of these files is.
     pub(super) fn spared_by_target(&self, target: &Target) -> Result<(), Diagnostic> {
         target.path().map_or(Ok(()), |path| self.spared_by(path, "-o"))
     }

@@ -227,8 +227,7 @@ impl<'a> Developer<'a> {
         lanes.map(|[c]| c)
     }
 
-    /// The same for premultiplied linear pixels side by side, each channel in a row of its
-    /// own.
+    /// Develops premultiplied linear pixels side by side, each channel in a row of its own.
     #[inline(always)]
     fn develop<const N: usize>(&self, pixels: &mut [[f32; N]; 4]) {
         let [r, g, b, coverage] = pixels;
@@ -257,9 +256,9 @@ impl<'a> Developer<'a> {
         *coverage = [1.0; N];
     }
 
-    /// The same where glass stands before the background. What is seen of a surface that covers a part of a pixel is developed as
-    /// if it covered all of it, and then taken as often; what glass shows by itself, a lamp in it, covers next to nothing and may
-    /// be brighter than that allows: as far as glass covers the pixel it is developed as it is.
+    /// Develops pixels where glass stands before the background. What is seen of a surface that covers a part of a pixel is
+    /// developed as if it covered all of it, and then taken as often; what glass shows by itself, a lamp in it, covers next to
+    /// nothing and may be brighter than that allows: as far as glass covers the pixel it is developed as it is.
     #[inline(always)]
     fn develop_glass<const N: usize>(&self, pixels: &mut [[f32; N]; 4], veil: &[[f32; N]; 4]) {
         let mut shown = [[0.0; N]; 3];

@@ -36,8 +36,8 @@ impl ToneMap {
         lanes.map(|[c]| c)
     }
 
-    /// The same for several colours at once, each channel in a row of its own: no lane takes a branch, so that the compiler
-    /// makes vectors of them, and each comes out as it would alone.
+    /// Maps several colours at once, each channel in a row of its own: no lane takes a branch, so that the compiler makes vectors
+    /// of them, and each comes out as it would alone.
     #[inline(always)]
     pub(super) fn map_lanes<const N: usize>(self, color: &mut [[f32; N]; 3]) {
         hold(color, BRIGHTEST);

@@ -12,7 +12,7 @@ pub(crate) struct Kind {
     pub(crate) list: &'static str,
     /// Code of the message when there is no such thing.
     pub(crate) code: &'static str,
-    /// The same when there are several of one name.
+    /// Code of the message where several have one name.
     pub(crate) ambiguous: &'static str,
     /// What there is to say where the list is empty.
     pub(crate) empty: &'static str,

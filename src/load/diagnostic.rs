@@ -52,7 +52,7 @@ impl Diagnostic {
         Self::new(OVER_MEMORY, file, place, text).remedy(RAISE_MEMORY)
     }
 
-    /// The same of all that a file holds.
+    /// A file holds more than memory is left for.
     pub(super) fn over_budget(file: &Path, over: OverBudget) -> Self {
         Self::over_memory(file, "", over.to_string())
     }

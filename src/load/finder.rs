@@ -23,7 +23,7 @@ const MISSES: usize = 256;
 pub(super) struct Place {
     /// Path relative to the model's folder, or absolute.
     pub path: PathBuf,
-    /// The same for all names of one file.
+    /// One path for all names of a file.
     pub canonical: PathBuf,
     /// Whether it lies elsewhere than its name says.
     pub guessed: bool,

@@ -358,7 +358,7 @@ mod tests {
         exr_of(colors, &[("R", r), ("G", g), ("B", b)], parts)
     }
 
-    /// The same with channels of these names.
+    /// An EXR file of one or several parts with channels of these names.
     fn exr_of(colors: [[f32; 2]; 3], channels: &[(&str, f32)], parts: usize) -> Source {
         use ::exr::prelude::*;
         let layer = |i: usize| {

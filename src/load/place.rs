@@ -100,7 +100,7 @@ pub(super) fn bounds(positions: &[DVec3]) -> (DVec3, DVec3) {
     bounds_of(positions.par_iter().map(|&p| if is_usable(p) { p } else { DVec3::NAN }))
 }
 
-/// The same of any places.
+/// The corners of the box around places.
 pub(super) fn bounds_of(places: impl IndexedParallelIterator<Item = DVec3>) -> (DVec3, DVec3) {
     let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let both = |(lo, hi): (DVec3, DVec3), (low, high): (DVec3, DVec3)| (lo.min(low), hi.max(high));

@@ -107,7 +107,7 @@ struct View<'a> {
     corners: &'a mut [[Vec4; 3]],
 }
 
-/// The same results on every machine.
+/// Functions with equal results on every machine.
 struct LibmOps;
 
 impl Ops for LibmOps {

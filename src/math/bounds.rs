@@ -61,10 +61,10 @@ impl EdgeMargins {
         displaced * (spread + 0.125 * displaced) + self.underflow
     }
 
-    /// The same in lanes, for shears that are products with a reciprocal and err by 2 u, and for triangles whose corners are
-    /// no farther from the origin along the ray's main axis than `height`, Z. A sheared corner is then displaced by 5 u D +
-    /// u M, and d = u (5/2 D + M). As every shear is at most 1 in size, D ≤ Z + M, and with r for the rounding
-    /// 8 r (5/2 Z + 7/2 M) (M + r (5/2 Z + 7/2 M)) ≤ M (28 r M + 20 r Z) + 100 r² Z² + 196 r² M².
+    /// The bound in lanes, for shears that are products with a reciprocal and err by 2 u, and for triangles whose corners are no
+    /// farther from the origin along the ray's main axis than `height`, Z. A sheared corner is then displaced by 5 u D + u M, and
+    /// d = u (5/2 D + M). As every shear is at most 1 in size, D ≤ Z + M, and with r for the rounding 8 r (5/2 Z + 7/2 M) (M + r
+    /// (5/2 Z + 7/2 M)) ≤ M (28 r M + 20 r Z) + 100 r² Z² + 196 r² M².
     #[inline(always)]
     pub fn error_by_height<S: Lanewise<N>, const N: usize>(
         &self,

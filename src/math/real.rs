@@ -14,7 +14,7 @@ pub trait Real:
     /// Bound of the relative error of a sum, difference or product; quotient and root err by at most twice that.
     const UNIT: f64;
 
-    /// The same number.
+    /// A number as one of this kind.
     fn of(x: f64) -> Self;
 
     /// The nearest `f64`.
@@ -129,7 +129,7 @@ impl Div for Double {
 pub struct Real3<R>(pub [R; 3]);
 
 impl<R: Real> Real3<R> {
-    /// The same point.
+    /// A point in numbers of this kind.
     pub fn of(p: DVec3) -> Self {
         Self(p.to_array().map(R::of))
     }

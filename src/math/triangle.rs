@@ -235,7 +235,7 @@ pub fn place(ray: &RaySpace, triangle: &Triangle) -> (f32, f32, f32) {
     (t, u, v)
 }
 
-/// The same, with what [`meet`] found, or with [`distance_f64`] and the normal (b − a) × (c − a).
+/// The weights of the corners at a distance that [`meet`] found, or [`distance_f64`] with the normal (b − a) × (c − a).
 ///
 /// Areas in the plane of the triangle, seen along the axis from which they are largest, so that a grazing ray is no worse
 /// than another.
@@ -266,7 +266,7 @@ pub fn flat_axes(normal: DVec3) -> [usize; 2] {
     }
 }
 
-/// The same corners in double precision.
+/// Corners in double precision.
 #[inline(always)]
 pub fn in_f64(&[a, b, c]: &Triangle) -> [DVec3; 3] {
     [a.as_dvec3(), b.as_dvec3(), c.as_dvec3()]

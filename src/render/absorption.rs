@@ -1,7 +1,8 @@
 //! Which materials absorb the light that goes through their inside, and how strongly.
 
+use super::media::{Media, MediaTable};
 use super::optics::transmittance;
-use super::wave::{Media, Path};
+use super::wave::Path;
 use crate::accel::{Hit, Ray};
 use crate::math::Vec3;
 use crate::scene::{Material, Reflection};
@@ -32,14 +33,14 @@ impl Absorption {
     }
 
     /// The coefficient of the medium that a ray is in; `None` in empty space.
-    pub(crate) fn within(&self, media: &Media) -> Option<Vec3> {
-        self.by(media.innermost()?.material)
+    pub(crate) fn within(&self, table: &MediaTable, media: Media) -> Option<Vec3> {
+        self.by(table.innermost(media)?.material)
     }
 
     /// A path after what its ray is inside of has absorbed its part of the light up to `hit`.
-    pub(crate) fn lessened(&self, ray: &Ray, path: &Path, hit: &Hit) -> Path {
+    pub(crate) fn lessened(&self, table: &MediaTable, ray: &Ray, path: &Path, hit: &Hit) -> Path {
         let length = (hit.t - path.since) * ray.dir.length();
-        let left = self.within(&path.media).map_or(Vec3::ONE, |a| transmittance(a, length));
+        let left = self.within(table, path.media).map_or(Vec3::ONE, |a| transmittance(a, length));
         Path { weight: path.weight * left, since: hit.t, ..*path }
     }
 }

@@ -4,10 +4,11 @@ use super::context::Context;
 use super::draws::{Purpose, SampleSet};
 use super::glint::{self, MIRROR};
 use super::hotspot::HotspotSampled;
+use super::media::{Crossing, MediaTable, Medium};
 use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};
 use super::shade::{BounceWeights, Bsdf, Lobe, ShadingFrame, above, has_inside};
-use super::wave::{Crossing, Medium, Path, RayClass};
+use super::wave::{Path, RayClass};
 use super::whitted::Tracer;
 use crate::accel::{Accel, Hit, NO_PRIM, Ray};
 use crate::math::Vec3;
@@ -69,8 +70,9 @@ pub(super) struct PathVertex<'a, G> {
 
 impl<G: ShadingPoint> PathVertex<'_, G> {
     /// The indices on both sides for light of `band`.
-    pub(super) fn crossing(&self, context: &Context, band: Option<u8>) -> Crossing {
-        let Some((ior, dispersion)) = self.bsdf.refraction() else { return self.path.media.pass() };
+    pub(super) fn crossing(&self, context: &Context, table: &mut MediaTable, band: Option<u8>) -> Crossing {
+        let media = self.path.media;
+        let Some((ior, dispersion)) = self.bsdf.refraction() else { return table.pass(media) };
         let band = band.and_then(|i| context.bands.get(usize::from(i)));
         let ior = match band {
             #[expect(clippy::cast_possible_truncation, reason = "indices are given in f32")]
@@ -79,7 +81,7 @@ impl<G: ShadingPoint> PathVertex<'_, G> {
             }
             _ => ior,
         };
-        self.path.media.cross(Medium { material: self.surface.material().0, ior }, self.surface.is_front())
+        table.cross(media, Medium { material: self.surface.material().0, ior }, self.surface.is_front())
     }
 
     pub(super) fn bounce_weights(&self, crossing: &Crossing) -> BounceWeights {
@@ -144,19 +146,21 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
         // White light splits: each part of the spectrum has its own index from here on, and its own share that is mirrored.
         let cosine = point.cosine();
-        self.reflect(point, self.split_bounce_weights(point, cosine).reflected);
+        let reflected = self.split_bounce_weights(point, cosine).reflected;
+        self.reflect(point, reflected);
         for (i, band) in (0u8..).zip(&self.context.bands) {
-            let crossing = point.crossing(self.context, Some(i));
+            let crossing = point.crossing(self.context, &mut self.media, Some(i));
             let weight = point.path.weight * point.bsdf.bounce_weights(cosine, &crossing).refracted * band.color;
             self.send_refracted(point, weight, &crossing, Some(i));
         }
     }
 
     /// The bounce weights of light that has all its wavelengths, of which each has its own.
-    fn split_bounce_weights<G: ShadingPoint>(&self, point: &PathVertex<G>, cosine: f32) -> BounceWeights {
+    fn split_bounce_weights<G: ShadingPoint>(&mut self, point: &PathVertex<G>, cosine: f32) -> BounceWeights {
         let mut all = BounceWeights::default();
         for (i, band) in (0u8..).zip(&self.context.bands) {
-            let bounce_weights = point.bsdf.bounce_weights(cosine, &point.crossing(self.context, Some(i)));
+            let crossing = point.crossing(self.context, &mut self.media, Some(i));
+            let bounce_weights = point.bsdf.bounce_weights(cosine, &crossing);
             all.reflected += bounce_weights.reflected * band.color;
             all.glass += bounce_weights.glass * band.color;
             all.refracted += bounce_weights.refracted * band.color;
@@ -191,7 +195,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
         rough.rays = 1;
         for (k, band) in (0u8..).zip(&self.context.bands) {
-            let crossing = point.crossing(self.context, Some(k));
+            let crossing = point.crossing(self.context, &mut self.media, Some(k));
             self.send_through_facet(point, &crossing, &rough, u32::from(k), Some(k), band.color);
         }
     }

@@ -27,9 +27,9 @@ use std::sync::Arc;
 /// Rays to a panorama from each point by default.
 const ENV_RAYS: u32 = 16;
 
-/// Shadow rays that wait before they are traced, and …
+/// Shadow rays that wait before they are traced.
 pub(super) const SHADOW_LIMIT: usize = 1 << 14;
-/// … rays to the surroundings.
+/// Rays to the surroundings that wait before they are traced.
 pub(super) const ENVIRONMENT_RAYS_LIMIT: usize = 1 << 15;
 /// Rays behind those of eyes that wait before they are traced.
 pub(super) const FOLLOWERS: usize = 1 << 17;

@@ -1,9 +1,9 @@
 //! How much of a picture shows something, as rays spread over it tell.
 
+use super::media::Media;
 use super::primary_rays::{Ball, Eye, Place};
 use super::shade::Reader;
 use super::surface::{HitPrim, Surface};
-use super::wave::Media;
 use super::{Job, sobol};
 use crate::accel::{Accel, Hit, NoProbe, Ray};
 use rayon::prelude::*;
@@ -64,13 +64,12 @@ fn sent(job: &Job, numbers: Range<u32>) -> Coverage {
         sample_width: 1.0,
         scene: Ball::around(scene, world),
         lens: None,
-        inside: Media::default(),
     };
     let place = |i: u32| {
         let [x, y] = sobol::point(i, 0);
         Place::new(x * f64::from(width), y * f64::from(height))
     };
-    let rays: Vec<Ray> = numbers.clone().map(|i| eye.ray_with_path(place(i)).0).collect();
+    let rays: Vec<Ray> = numbers.clone().map(|i| eye.ray_with_path(place(i), Media::OUTSIDE).0).collect();
     let mut hits = vec![Hit::MISS; rays.len()];
     let mut scratch = accel.scratch();
     accel.closest(&rays, &mut hits, &mut scratch, &mut NoProbe);

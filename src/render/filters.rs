@@ -7,12 +7,12 @@
 use super::Settings;
 use super::absorption::Absorption;
 use super::context::Context;
+use super::media::{Media, MediaTable, Medium};
 use super::optics::transmittance;
 use super::seam::{is_same_crossing, is_same_surface};
 use super::shade::{Reader, has_inside, shadow_filter};
 use super::surface::{HitPrim, Surface};
 use super::texture::TextureStore;
-use super::wave::{Media, Medium};
 use super::world::World;
 use crate::accel::shapes::Prim;
 use crate::accel::{Hit, OccludedFilter, Ray};
@@ -38,7 +38,7 @@ pub(super) fn weaken(
     crossed: &mut Hit,
     Passed { hit, left }: &Passed,
     light: &mut Vec3,
-    inside: Option<&mut Inside>,
+    inside: Option<(&mut Inside, &mut MediaTable)>,
 ) {
     if unbent.is_some_and(|left| hit.t <= left.t && is_same_surface(|prim| context.face(prim), ray, left, hit)) {
         return;
@@ -218,7 +218,7 @@ pub(super) fn filter_at(
     target: &HitPrim,
     ray: &Ray,
     hit: &Hit,
-    inside: Option<&mut Inside>,
+    inside: Option<(&mut Inside, &mut MediaTable)>,
 ) -> Vec3 {
     if target.material.is_opaque() && !context.no_prune {
         return Vec3::ZERO;
@@ -229,9 +229,10 @@ pub(super) fn filter_at(
     let patch = target.patch(context.world, hit.u, hit.v, ray.origin + ray.dir * hit.t);
     let reader = Reader { store: context.textures, patch: patch.as_ref(), known: &[] };
     let filter = shadow_filter(target.material, &reader);
-    let Some(inside) = inside.filter(|_| has_inside(target.material)) else { return filter };
+    let Some((inside, table)) = inside.filter(|_| has_inside(target.material)) else { return filter };
     let entering = Surface::new(context.world, *target, ray, hit, 0.0).front;
-    filter * inside.cross(target.material_id, entering, ray, hit, &context.absorption)
+    let front = (target.material_id, entering);
+    filter * inside.cross((table, &context.absorption), front, ray, hit)
 }
 
 impl Inside {
@@ -241,13 +242,19 @@ impl Inside {
     }
 
     /// Goes in or out through the surface of a material: what is left of the light before that.
-    fn cross(&mut self, material: u32, entering: bool, ray: &Ray, hit: &Hit, absorption: &Absorption) -> Vec3 {
-        let crossing = self.media.cross(Medium { material, ior: 1.0 }, entering);
+    fn cross(
+        &mut self,
+        (table, absorption): (&mut MediaTable, &Absorption),
+        (material, entering): (u32, bool),
+        ray: &Ray,
+        hit: &Hit,
+    ) -> Vec3 {
+        let crossing = table.cross(self.media, Medium { material, ior: 1.0 }, entering);
         // What is left without having been entered was all around from the start.
         let before = if !entering && self.media == crossing.beyond {
             absorption.by(material)
         } else {
-            absorption.within(&self.media)
+            absorption.within(table, self.media)
         };
         let length = (hit.t - self.since) * ray.dir.length();
         *self = Self { media: crossing.beyond, since: hit.t };
@@ -267,10 +274,10 @@ mod tests {
     fn left(crossings: &[(f32, u32, bool)]) -> Vec3 {
         let dir = Vec3::new(0.0, 0.0, 2.0);
         let ray = Ray { origin: Vec3::ZERO, t_min: 0.0, dir, t_max: 9.0, exclude: NO_PRIM, sample: 0 };
-        let mut inside = Inside { media: Media::default(), since: 0.0 };
+        let (mut table, mut inside) = (MediaTable::default(), Inside::of(Media::OUTSIDE));
         let absorption = Absorption::from(vec![THIN, DENSE]);
         let cross = |&(t, which, entering): &(f32, u32, bool)| {
-            inside.cross(which, entering, &ray, &Hit { t, ..Hit::MISS }, &absorption)
+            inside.cross((&mut table, &absorption), (which, entering), &ray, &Hit { t, ..Hit::MISS })
         };
         crossings.iter().map(cross).product()
     }

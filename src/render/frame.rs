@@ -4,12 +4,12 @@ use super::Settings;
 use super::certainty;
 use super::context::Context;
 use super::immersion::media_around;
+use super::media::Medium;
 use super::pixel::sample_offsets;
 use super::primary_rays::{Ball, Eye, Place, ThinLens};
 use super::sampling::Sampling;
 use super::sobol::{self, mix};
 use super::view::View;
-use super::wave::Media;
 use super::whitted::Sample;
 use crate::accel::Accel;
 use crate::math::simd::{Kernel, LANES, Level, Simd};
@@ -28,8 +28,8 @@ pub(super) struct Frame<'a> {
     /// Sharpness of one sample relative to a pixel.
     sample_width: f32,
     scene: Ball,
-    /// What the eye is inside of.
-    inside: Media,
+    /// What the eye is inside of, the innermost last.
+    pub media: Vec<Medium>,
     pub background: Option<Vec3>,
     /// Whether glass may stand before it.
     pub has_veil: bool,
@@ -58,16 +58,16 @@ impl<'a> Frame<'a> {
             Sampling::Stochastic(how) => certainty::factor(how.confidence),
             Sampling::Uniform | Sampling::Adaptive(_) => 0.0,
         };
-        let (scene, inside) = (Ball::around(context.scene, context.world), media_around(context, accel, view));
+        let (scene, media) = (Ball::around(context.scene, context.world), media_around(context, accel, view));
         let has_veil = background.is_some() && context.lets_background_through;
-        Self { view, settings, offsets, sample_width, scene, inside, background, has_veil, standard_errors }
+        Self { view, settings, offsets, sample_width, scene, media, background, has_veil, standard_errors }
     }
 
     /// Where eye rays come from.
     pub(super) fn eye(&self, center: DVec3) -> Eye<'_> {
         let Settings { width, height, lens, .. } = *self.settings;
-        let Self { view, sample_width, scene, inside, .. } = *self;
-        Eye { view, width, height, center, sample_width, scene, lens, inside }
+        let Self { view, sample_width, scene, .. } = *self;
+        Eye { view, width, height, center, sample_width, scene, lens }
     }
 
     /// The places of the samples of a pixel when they are the same in each, but for the lens.

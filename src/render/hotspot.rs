@@ -9,10 +9,11 @@
 use super::branch::{PathVertex, Rough, ShadingPoint};
 use super::context::Context;
 use super::draws::Purpose;
+use super::media::{Crossing, Media};
 use super::observer::Observer;
 use super::optics::reflect;
 use super::shade::{Lobe, ShadingFrame, above};
-use super::wave::{Crossing, Media, RayClass};
+use super::wave::RayClass;
 use super::whitted::Tracer;
 use crate::accel::Accel;
 use crate::math::Vec3;
@@ -28,13 +29,12 @@ impl HotspotSampled {
     /// Of those that go on in empty space, unless it is not the sky that they see there. Between the walls of glass they
     /// are turned again before they leave it.
     fn of<G: ShadingPoint>(context: &Context, point: &PathVertex<G>, crossing: &Crossing, lobe: &Lobe) -> Self {
-        let is_outside = |media: &Media| media.innermost().is_none();
         let sees_background = point.path.straight && crossing.n_i == crossing.n_t && !context.shows_environment;
         match context.sky.hotspot() {
             // What shows the whole sun or nothing of it needs no help.
             Some(area) if lobe.solid_angle() > area => Self {
-                mirrored: is_outside(&point.path.media),
-                through: is_outside(&crossing.beyond) && !sees_background,
+                mirrored: point.path.media == Media::OUTSIDE,
+                through: crossing.beyond == Media::OUTSIDE && !sees_background,
             },
             _ => Self::default(),
         }

@@ -1,10 +1,10 @@
 //! What an eye is inside of: rays from it begin there, are bent by what they leave, and absorbed from the start.
 
 use super::context::Context;
+use super::media::{Media, MediaTable, Medium};
 use super::shade::has_inside;
 use super::surface::{HitPrim, Surface};
 use super::view::View;
-use super::wave::{Media, Medium};
 use crate::accel::{Accel, Hit, NoProbe, Ray};
 use crate::math::Vec3;
 use crate::scene::{Material, Reflection};
@@ -12,23 +12,19 @@ use crate::scene::{Material, Reflection};
 /// Surfaces that are looked at along one way.
 const FACES: usize = 256;
 
-/// The substances around the eye of a view, where any have an inside: those that are left without having been entered,
+/// The substances around the eye of a view, the innermost last, where any have an inside: those that are left without having been entered,
 /// whichever way one goes. Panes without an inside are so left on some ways only.
-pub(super) fn media_around<A: Accel>(context: &Context, accel: &A, view: &View) -> Media {
+pub(super) fn media_around<A: Accel>(context: &Context, accel: &A, view: &View) -> Vec<Medium> {
     if !context.scene.materials.iter().any(has_inside) {
-        return Media::default();
+        return Vec::new();
     }
     let mut scratch = accel.scratch();
     let mut left = ways(view).map(|dir| left_along(context, accel, &mut scratch, view, dir));
-    let Some(first) = left.next() else { return Media::default() };
+    let Some(first) = left.next() else { return Vec::new() };
     let around = left.fold(first, |around, left| around.into_iter().filter(|m| left.contains(m)).collect());
-    let mut media = Media::default();
     // The first that is left is the innermost.
-    for &material in around.iter().rev() {
-        let ior = index(&context.scene.materials[material as usize]);
-        media = media.cross(Medium { material, ior }, true).beyond;
-    }
-    media
+    let medium = |&material: &u32| Medium { material, ior: index(&context.scene.materials[material as usize]) };
+    around.iter().rev().map(medium).collect()
 }
 
 /// Along the view, and all around in the corners of a cube.
@@ -41,7 +37,7 @@ fn ways(view: &View) -> impl Iterator<Item = Vec3> {
 fn left_along<A: Accel>(context: &Context, accel: &A, scratch: &mut A::Scratch, view: &View, dir: Vec3) -> Vec<u32> {
     let origin = (view.eye - context.world.center).as_vec3();
     let ray = Ray::new(origin, dir);
-    let (mut entered, mut left) = (Media::default(), Vec::new());
+    let (mut table, mut entered, mut left) = (MediaTable::default(), Media::OUTSIDE, Vec::new());
     let mut hit = [Hit::MISS];
     accel.closest(&[ray], &mut hit, scratch, &mut NoProbe);
     for _ in 0..FACES {
@@ -51,7 +47,7 @@ fn left_along<A: Accel>(context: &Context, accel: &A, scratch: &mut A::Scratch, 
         let target = HitPrim::new(context.scene, context.world, hit[0].prim);
         if has_inside(target.material) {
             let entering = Surface::new(context.world, target, &ray, &hit[0], 0.0).front;
-            let beyond = entered.cross(Medium { material: target.material_id, ior: 1.0 }, entering).beyond;
+            let beyond = table.cross(entered, Medium { material: target.material_id, ior: 1.0 }, entering).beyond;
             if !entering && beyond == entered && !left.contains(&target.material_id) {
                 left.push(target.material_id);
             }

@@ -32,6 +32,7 @@ mod immersion;
 mod instancing;
 mod layers;
 mod lobe_frame;
+mod media;
 pub mod no_prune;
 pub(crate) mod observer;
 pub mod optics;

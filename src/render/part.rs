@@ -17,10 +17,10 @@ use std::time::Duration;
 /// Columns and rows of a square.
 pub(super) const SIDE: u32 = 8;
 
-/// One square in so many is looked at …
+/// One square in so many is looked at.
 const ONE_IN: usize = 100;
 
-/// … but at least so many of them: what is estimated from them is then right within about a tenth.
+/// Squares at least: what is estimated from them is then right within about a tenth.
 const LEAST: usize = 128;
 
 /// Squares of a picture of this size: all of them where it is small.

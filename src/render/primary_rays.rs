@@ -1,7 +1,8 @@
 //! Rays from the eye: the first wave of every batch of pixels, many at a time.
 
+use super::media::Media;
 use super::view::{Lens, PrimaryRay, View};
-use super::wave::{Media, Path};
+use super::wave::Path;
 use super::world::World;
 use crate::accel::{Hit, NO_PRIM, Pencil, Ray};
 use crate::math::simd::{Kernel, LANES, Level, Simd};
@@ -25,7 +26,7 @@ pub(crate) struct PrimaryRays {
     /// Whether all start where the eye is.
     is_pencil: bool,
     /// What all start inside of.
-    inside: Media,
+    pub media: Media,
 }
 
 /// Rays that ask for their first hits.
@@ -81,8 +82,6 @@ pub(crate) struct Eye<'a> {
     pub scene: Ball,
     /// `None`: everything is sharp.
     pub lens: Option<ThinLens>,
-    /// What it is inside of.
-    pub inside: Media,
 }
 
 /// An eye farther from the scene than this many of its diagonals starts its rays just before the scene.
@@ -105,10 +104,10 @@ struct EyeRay {
 }
 
 impl Eye<'_> {
-    /// The ray of a place, and what it carries, as sample 0.
-    pub(crate) fn ray_with_path(&self, place: Place) -> (Ray, Path) {
+    /// The ray of a place, and what it carries inside of `media`, as sample 0.
+    pub(crate) fn ray_with_path(&self, place: Place, media: Media) -> (Ray, Path) {
         let EyeRay { origin, dir, cone_width, cone_spread } = self.ray(place);
-        (ray(origin, dir, 0), Path::from_eye(cone_width, cone_spread, self.inside))
+        (ray(origin, dir, 0), Path::from_eye(cone_width, cone_spread, media))
     }
 
     /// The ray of a place, started before the scene when the eye is far away, in the centred frame.
@@ -275,7 +274,6 @@ impl PrimaryRays {
         self.make_room(start + RUN);
         self.count += run.count.min(RUN);
         self.is_pencil &= eye.sees_from_one_place();
-        self.inside = eye.inside;
         let [x, y, z] = &mut self.dirs;
         let columns = [x, y, z, &mut self.cone_width, &mut self.cone_spread].map(|column| from(column, start));
         let (Some(rays), [Some(x), Some(y), Some(z), Some(width), Some(spread)]) =
@@ -319,12 +317,12 @@ impl PrimaryRays {
 
     /// Whether they start inside of something.
     pub(crate) fn are_immersed(&self) -> bool {
-        self.inside.innermost().is_some()
+        self.media != Media::OUTSIDE
     }
 
     /// What the `i`th ray carries.
     pub(crate) fn path(&self, i: usize) -> Path {
-        Path::from_eye(self.cone_width[i], self.cone_spread[i], self.inside)
+        Path::from_eye(self.cone_width[i], self.cone_spread[i], self.media)
     }
 }
 
@@ -443,16 +441,7 @@ mod tests {
 
     fn eye(view: &View, lens: Option<ThinLens>) -> Eye<'_> {
         let scene = Ball { center: DVec3::ZERO, radius: f64::INFINITY };
-        Eye {
-            view,
-            width: 40,
-            height: 30,
-            center: DVec3::ZERO,
-            sample_width: 1.0,
-            scene,
-            lens,
-            inside: Media::default(),
-        }
+        Eye { view, width: 40, height: 30, center: DVec3::ZERO, sample_width: 1.0, scene, lens }
     }
 
     #[test]
@@ -519,7 +508,7 @@ mod tests {
                 assert_eq!(by_columns.rays(), eyes.rays());
             }
             for (i, ray) in (0..100).zip(eyes.rays()) {
-                assert_eq!(*ray, Ray { sample: i, ..eye.ray_with_path(place(i)).0 }, "{lens:?}");
+                assert_eq!(*ray, Ray { sample: i, ..eye.ray_with_path(place(i), Media::OUTSIDE).0 }, "{lens:?}");
             }
         }
     }

@@ -78,11 +78,11 @@ impl Roulette {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::wave::Media;
+    use crate::render::media::Media;
 
     fn path(weight: f32, branch: u32) -> Path {
         let weight = Vec3::new(weight, 0.5 * weight, 0.0);
-        Path { weight, branch, straight: false, ..Path::from_eye(0.0, 0.0, Media::default()) }
+        Path { weight, branch, straight: false, ..Path::from_eye(0.0, 0.0, Media::OUTSIDE) }
     }
 
     #[test]

@@ -8,6 +8,7 @@ use super::branch::PathVertex;
 use super::context::Context;
 use super::curve::ShadowRays;
 use super::draws::{Draws, Purpose};
+use super::media::Media;
 use super::observer::Observer;
 use super::primary_rays::PrimaryRays;
 use super::seam::{is_same_crossing, is_same_surface};
@@ -308,7 +309,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let Some(common) = &context.common[mesh.material as usize] else { return };
         let (smooth, reads) = (!mesh.normals.is_empty(), common.mapped || !mesh.colors.is_empty());
         let (bsdf, shiny, placement) = (&common.bsdf, common.shiny, context.world.placement(instance));
-        batch.take(hits, by_instance, (traced, &context.absorption), smooth);
+        batch.take(hits, by_instance, (traced, &context.absorption, &self.media), smooth);
         batch.find(smooth.then_some(placement));
         if reads || shiny || context.looks_around_by_points() {
             batch.widen(traced);
@@ -341,7 +342,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if common.sends_by_points() {
             self.each_point(traced, common, batch, |tracer, point| {
                 if point.path.depth < context.depth {
-                    tracer.reflect_and_refract(point, &point.crossing(context, point.path.band));
+                    let crossing = point.crossing(context, &mut tracer.media, point.path.band);
+                    tracer.reflect_and_refract(point, &crossing);
                 }
             });
         } else if shiny && context.depth > 0 {
@@ -356,7 +358,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let (context, class) = (self.context, traced.class());
         let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
         let lessened = |path| match context.absorption.is_some() {
-            true => context.absorption.lessened(ray, &path, hit),
+            true => context.absorption.lessened(&self.media, ray, &path, hit),
             false => path,
         };
         match passed {
@@ -392,7 +394,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             batch.shown().for_each(|(sample, everywhere)| self.add(sample, everywhere));
         }
         let absorbs = context.absorption.is_some();
-        let within = absorbs && batch.certain().any(|i| traced.path(batch.arrival(i).0).media.innermost().is_some());
+        let within = absorbs && batch.certain().any(|i| traced.path(batch.arrival(i).0).media != Media::OUTSIDE);
         let what = (bsdf, common.shiny, has_inside);
         let mut draws = std::mem::take(&mut self.buffers.draws);
         draws.clear();

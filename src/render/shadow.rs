@@ -4,10 +4,10 @@ use super::asking::Asking;
 use super::context::Context;
 use super::curve::ShadowRays;
 use super::filters::{Inside, Met, Passed, Through, filter_at, weaken};
+use super::media::{Media, MediaTable};
 use super::observer::Observer;
 use super::surface::HitPrim;
 use super::tail::Tail;
-use super::wave::Media;
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
 use bytemuck::{Pod, Zeroable};
@@ -68,14 +68,14 @@ impl ShadowQueue {
         self.push(shadow_rays.ray, light, media);
     }
 
-    /// The same as [`Self::push`] of a ray that ends at glass, and has left this hit, with `t` as far as it may meet the same
-    /// surface again: all rays, or none.
+    /// Adds a ray that ends at glass, and has left this hit, with `t` as far as it may meet the same surface again: all rays, or
+    /// none.
     pub(crate) fn push_unbent(&mut self, ray: Ray, left: Hit, light: Vec3, media: Option<Media>) {
         self.push(ray, light, media);
         self.unbent.push(left);
     }
 
-    /// The same as [`Self::push`] of light that need not be bound for the ray's sample.
+    /// Adds a ray whose light need not be bound for its sample.
     pub(crate) fn push_bound(&mut self, ray: Ray, light: Bound, media: Option<Media>) {
         self.rays.push(ray);
         self.light.push(light);
@@ -107,7 +107,7 @@ impl ShadowQueue {
     /// Traces all rays and hands what arrives to `arrive`, as (sample or tag, light) in the order of the rays.
     pub(crate) fn trace<A: Accel, P: Observer>(
         &mut self,
-        context: &Context,
+        (context, media): (&Context, &mut MediaTable),
         asking: &mut Asking<A>,
         probe: &mut P,
         mut arrive: impl FnMut(u32, Vec3),
@@ -120,7 +120,7 @@ impl ShadowQueue {
             let through = Through::new(context, &self.rays, &self.met);
             asking.stopped(&through, &mut self.blocked, probe);
             self.climb(context, asking, probe);
-            self.pass(context);
+            self.pass(context, media);
         } else {
             asking.occluded(&self.rays, &mut self.blocked, probe);
             self.climb(context, asking, probe);
@@ -129,7 +129,7 @@ impl ShadowQueue {
                 self.going.extend((0..self.rays.len()).filter(|&i| !blocked[i]));
             }
         }
-        self.go_through(context, asking, probe);
+        self.go_through((context, media), asking, probe);
         let open = self.light.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked);
         open.for_each(|(light, _)| arrive(light.tag, light.radiance));
         self.clear();
@@ -137,7 +137,7 @@ impl ShadowQueue {
 
     /// Weakens the light of rays by all that they have met, in the order of the hits; of those that have met too much to note
     /// it all, tells that they go on by themselves.
-    fn pass(&mut self, context: &Context) {
+    fn pass(&mut self, context: &Context, media: &mut MediaTable) {
         let met = self.met.get_mut();
         for i in 0..self.rays.len() {
             let noted = met.last(i);
@@ -157,7 +157,7 @@ impl ShadowQueue {
                     &mut crossed,
                     passed,
                     light,
-                    self.inside.get_mut(i),
+                    self.inside.get_mut(i).map(|inside| (inside, &mut *media)),
                 );
                 self.blocked[i] = is_dark(*light);
                 if self.blocked[i] {
@@ -168,7 +168,12 @@ impl ShadowQueue {
     }
 
     /// Walks through what is on the way of those that go on, one surface of each ray a time.
-    fn go_through<A: Accel, P: Observer>(&mut self, context: &Context, asking: &mut Asking<A>, probe: &mut P) {
+    fn go_through<A: Accel, P: Observer>(
+        &mut self,
+        (context, media): (&Context, &mut MediaTable),
+        asking: &mut Asking<A>,
+        probe: &mut P,
+    ) {
         if self.going.is_empty() {
             return;
         }
@@ -180,7 +185,7 @@ impl ShadowQueue {
         self.hits.clone_from(&self.after);
         asking.closest(&self.on_way, &mut self.hits, probe);
         while !self.going.is_empty() {
-            self.filter(context);
+            self.filter(context, media);
             self.hits.clear();
             self.hits.resize(self.going.len(), Hit::MISS);
             asking.next(&self.on_way, &self.after, &mut self.hits, probe);
@@ -226,7 +231,7 @@ impl ShadowQueue {
     }
 
     /// Weakens the light of rays that have met something more, and blocks those it leaves dark; the others go on.
-    fn filter(&mut self, context: &Context) {
+    fn filter(&mut self, context: &Context, media: &mut MediaTable) {
         let mut kept = 0;
         for k in 0..self.going.len() {
             let (i, hit) = (self.going[k], self.hits[k]);
@@ -234,7 +239,8 @@ impl ShadowQueue {
                 continue;
             }
             let (ray, light, mut crossed) = (self.on_way[k], &mut self.light[i].radiance, self.crossed[k]);
-            weaken(context, (&ray, self.unbent.get(i)), &mut crossed, &hit.into(), light, self.inside.get_mut(i));
+            let inside = self.inside.get_mut(i).map(|inside| (inside, &mut *media));
+            weaken(context, (&ray, self.unbent.get(i)), &mut crossed, &hit.into(), light, inside);
             self.blocked[i] = is_dark(*light);
             if self.blocked[i] {
                 continue;

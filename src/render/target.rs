@@ -39,9 +39,9 @@ pub(super) struct Plan<P> {
     slope: f64,
     /// How many times the work of one rendering all together take: that many times less is the square of their error.
     pub work: f64,
-    /// Eye rays spent on finding this out, …
+    /// Eye rays spent on finding this out.
     pub rays: u64,
-    /// … and seconds of processor time.
+    /// Seconds of processor time spent on that.
     pub spent: f64,
     /// Seconds of processor time of one rendering, as foretold.
     cpu: f64,

@@ -283,8 +283,8 @@ pub(crate) fn trace_sample<A: Accel, P: Observer>(
     }
     let place = frame.places((x, y)).nth(sample as usize)?;
     let mut tracer = Tracer::<A, P>::new(context, accel, &());
-    tracer.reset(1, false);
-    let (ray, path) = frame.eye(tracer.center()).ray_with_path(place);
+    tracer.reset(1, false, &frame.media);
+    let (ray, path) = frame.eye(tracer.center()).ray_with_path(place, tracer.eyes.media);
     tracer.start(ray, path);
     tracer.trace().then(|| (tracer.samples[0], tracer.counts))
 }
@@ -341,7 +341,7 @@ pub(crate) fn batches(settings: &Settings) -> Vec<Vec<u32>> {
     batches
 }
 
-/// Those of a picture, row by row.
+/// The tiles of a picture, row by row.
 pub(super) fn tiles(width: u32, height: u32) -> Vec<Tile> {
     let starts = |end: u32| (0..end).step_by(TILE as usize);
     let tile = |x0: u32, y0: u32| Tile {
@@ -512,7 +512,7 @@ impl Frame<'_> {
         // Nested iterators are quick from inside, and slow one after another.
         tile.places().for_each(|at| places.push(at));
         for places in places.chunks(pixels) {
-            tracer.reset(places.len() * self.offsets.len(), self.settings.layers);
+            tracer.reset(places.len() * self.offsets.len(), self.settings.layers, &self.media);
             let eye = self.eye(tracer.center());
             if self.settings.lens.is_some() {
                 tracer.eyes.send(&eye, places.iter().flat_map(|&at| self.places(at)));

@@ -3,6 +3,7 @@
 //! There is no recursion and no allocation per ray: shading pushes children into queues, and each queue is drained in
 //! slices of rays of one class. The queues are buffers of one worker, reused from tile to tile.
 
+use super::media::Media;
 use super::sobol::mix;
 use crate::accel::{Hit, Ray};
 use crate::math::Vec3;
@@ -56,7 +57,7 @@ pub(crate) struct Path {
 }
 
 impl Path {
-    /// That of a ray from the eye, inside of `media`.
+    /// The path of a ray from the eye, inside of `media`.
     pub(crate) fn from_eye(cone_width: f32, cone_spread: f32, media: Media) -> Self {
         Self {
             weight: Vec3::ONE,
@@ -75,97 +76,14 @@ impl Path {
         }
     }
 
-    /// The same behind the back of a one-sided face, which no ray sees, but which is in the way of those to the hotspot.
+    /// The path behind the back of a one-sided face, which no ray sees, but which is in the way of rays to the hotspot.
     pub(crate) fn behind_back(self) -> Self {
         Self { skips_hotspot: false, ..self }
     }
 
-    /// The same after a turn that no other ray from this point takes.
+    /// The path after a turn that no other ray from this point takes.
     pub(crate) fn turned(self, class: RayClass, number: u32) -> Self {
         Self { branch: mix(self.branch, (number << 2) | class as u32), ..self }
-    }
-}
-
-/// One substance a ray is inside of.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Medium {
-    /// Index into the scene's materials.
-    pub material: u32,
-    /// Index of refraction.
-    pub ior: f32,
-}
-
-/// The substances a ray is inside of, the innermost last.
-///
-/// After C. M. Schmidt and B. Budge, "Simple Nested Dielectrics in Ray Traced Images" (2002), with the most recently
-/// entered substance as the one that counts. A substance that was never entered may be left (an open mesh, an eye
-/// inside glass), and the oldest is forgotten when there are more than fit.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Media {
-    len: u8,
-    items: [Medium; Self::CAPACITY],
-}
-
-/// What happens to a ray at the boundary of a substance.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Crossing {
-    /// Index on the side the ray comes from.
-    pub n_i: f32,
-    /// Index on the other side.
-    pub n_t: f32,
-    /// What a ray that goes through is inside of afterwards.
-    pub beyond: Media,
-}
-
-impl Crossing {
-    /// How many times as far as normals directions turn that go through, when light falls in steeply.
-    pub(crate) fn turns(&self) -> f32 {
-        (1.0 - self.n_i / self.n_t).abs()
-    }
-}
-
-impl Media {
-    const CAPACITY: usize = 4;
-    /// Index of empty space.
-    const OUTSIDE: f32 = 1.0;
-
-    /// The substance that counts; `None` in empty space.
-    pub(crate) fn innermost(&self) -> Option<Medium> {
-        self.items[..self.len as usize].last().copied()
-    }
-
-    fn ior(&self) -> f32 {
-        self.innermost().map_or(Self::OUTSIDE, |m| m.ior)
-    }
-
-    fn enter(&mut self, medium: Medium) {
-        if self.len as usize == Self::CAPACITY {
-            self.items.copy_within(1.., 0);
-            self.len -= 1;
-        }
-        self.items[self.len as usize] = medium;
-        self.len += 1;
-    }
-
-    /// A surface with the same on both sides, which rays pass straight.
-    pub(crate) fn pass(&self) -> Crossing {
-        Crossing { n_i: self.ior(), n_t: self.ior(), beyond: *self }
-    }
-
-    /// The indices on both sides of the surface of `medium`, and the media beyond it.
-    pub(crate) fn cross(&self, medium: Medium, entering: bool) -> Crossing {
-        let mut beyond = *self;
-        if entering {
-            beyond.enter(medium);
-            return Crossing { n_i: self.ior(), n_t: medium.ior, beyond };
-        }
-        let inside = &self.items[..self.len as usize];
-        let Some(at) = inside.iter().rposition(|m| m.material == medium.material) else {
-            return Crossing { n_i: medium.ior, n_t: self.ior(), beyond };
-        };
-        beyond.items.copy_within(at + 1.., at);
-        beyond.len -= 1;
-        Crossing { n_i: self.ior(), n_t: beyond.ior(), beyond }
     }
 }
 
@@ -313,52 +231,10 @@ mod tests {
         Ray { origin: Vec3::ZERO, t_min: 0.0, dir: Vec3::Z, t_max: 1.0, exclude: NO_PRIM, sample }
     }
 
-    const GLASS: Medium = Medium { material: 1, ior: 1.5 };
-    const WATER: Medium = Medium { material: 2, ior: 1.33 };
-
-    fn indices(c: &Crossing) -> (f32, f32) {
-        (c.n_i, c.n_t)
-    }
-
-    #[test]
-    fn a_glass_of_water_is_crossed_with_the_right_indices() {
-        let into_glass = Media::default().cross(GLASS, true);
-        let into_water = into_glass.beyond.cross(WATER, true);
-        let out_of_water = into_water.beyond.cross(WATER, false);
-        let out_of_glass = out_of_water.beyond.cross(GLASS, false);
-        assert_eq!(indices(&into_glass), (1.0, 1.5));
-        assert_eq!(indices(&into_water), (1.5, 1.33));
-        assert_eq!(indices(&out_of_water), (1.33, 1.5));
-        assert_eq!(indices(&out_of_glass), (1.5, 1.0));
-        assert_eq!(out_of_glass.beyond.len, 0);
-    }
-
-    #[test]
-    fn leaving_the_outer_of_two_overlapping_substances_bends_nothing() {
-        let both = Media::default().cross(GLASS, true).beyond.cross(WATER, true).beyond;
-        let out = both.cross(GLASS, false);
-        assert_eq!(indices(&out), (1.33, 1.33));
-        assert_eq!(indices(&out.beyond.cross(WATER, false)), (1.33, 1.0));
-    }
-
-    #[test]
-    fn a_substance_that_was_never_entered_can_be_left() {
-        assert_eq!(indices(&Media::default().cross(GLASS, false)), (1.5, 1.0));
-    }
-
-    #[test]
-    fn more_substances_than_fit_forget_the_oldest() {
-        let mut media = Media::default();
-        for material in 0..6 {
-            media = media.cross(Medium { material, ior: 2.0 + material as f32 }, true).beyond;
-        }
-        assert_eq!(media.items.map(|m| m.material), [2, 3, 4, 5]);
-    }
-
     #[test]
     fn a_queue_gives_its_last_rays_first_and_keeps_the_rest() {
         let (mut queue, mut wave) = (Queue::default(), Wave::default());
-        let path = Path::from_eye(0.0, 0.0, Media::default());
+        let path = Path::from_eye(0.0, 0.0, Media::OUTSIDE);
         (0..5).for_each(|sample| queue.push(ray(sample), path, Hit::MISS));
         queue.take(&mut wave, (3, 3));
         assert_eq!(wave.rays.iter().map(|r| r.sample).collect::<Vec<_>>(), [2, 3, 4]);
@@ -383,11 +259,7 @@ mod tests {
                 for &sample in samples {
                     for _ in 0..1 + sample % 3 {
                         let ray = Ray { t_min: sent[sample as usize] as f32, ..ray(sample) };
-                        queue.push(
-                            ray,
-                            Path { depth: sample, ..Path::from_eye(0.0, 0.0, Media::default()) },
-                            Hit::MISS,
-                        );
+                        queue.push(ray, Path { depth: sample, ..Path::from_eye(0.0, 0.0, Media::OUTSIDE) }, Hit::MISS);
                         sent[sample as usize] += 1;
                     }
                 }

@@ -16,6 +16,7 @@ use super::context::{Context, ENVIRONMENT_RAYS_LIMIT, FOLLOWERS, SHADOW_LIMIT};
 use super::draws::{Draws, Purpose, Stream};
 use super::glint;
 use super::layers::FirstSurface;
+use super::media::{Crossing, MediaTable, Medium};
 use super::no_prune::look_up_in_vain;
 use super::observer::Observer;
 use super::primary_rays::{PrimaryQuery, PrimaryRays};
@@ -26,7 +27,7 @@ use super::shadow::ShadowQueue;
 use super::sky::{EnvironmentPoint, EnvironmentRays};
 use super::sobol::mix;
 use super::surface::{HitPrim, Surface};
-use super::wave::{Crossing, Path, Queue, RayClass, Wave};
+use super::wave::{Path, Queue, RayClass, Wave};
 use crate::accel::{Accel, Hit, HitQueries, IntersectFilter, Ray};
 use crate::math::{DVec3, Vec3};
 use bytemuck::{Pod, Zeroable};
@@ -58,6 +59,8 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     /// Rays that go on behind a hit, by class.
     pub(super) continuing: [Queue; 3],
     wave: Wave,
+    /// What rays are inside of.
+    pub(super) media: MediaTable,
     pub(super) buffers: ShadingBuffers,
     pub(super) shadows: ShadowQueue,
     /// Rays to the hotspot of the sky.
@@ -92,6 +95,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             starting: Default::default(),
             continuing: Default::default(),
             wave: Wave::default(),
+            media: MediaTable::default(),
             buffers: ShadingBuffers::default(),
             shadows: ShadowQueue::default(),
             hotspots: ShadowQueue::default(),
@@ -110,14 +114,15 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.context.world.center
     }
 
-    /// Prepares for `samples` samples, whose eye rays are added to [`Self::eyes`].
-    pub(crate) fn reset(&mut self, samples: usize, layers: bool) {
+    /// Prepares for `samples` samples, whose eye rays are added to [`Self::eyes`], and start inside of `media`.
+    pub(crate) fn reset(&mut self, samples: usize, layers: bool, media: &[Medium]) {
         self.counts.each_mut().into_iter().for_each(|probe| probe.batch(samples));
         self.starting.iter_mut().chain(&mut self.continuing).for_each(Queue::clear);
         self.shadows.clear();
         self.hotspots.clear();
         self.environment_rays.clear();
         self.eyes.clear();
+        self.eyes.media = self.media.reset(media);
         self.streams.clear();
         self.roulette = Roulette::default();
         self.by_chance.clear();
@@ -210,12 +215,17 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let samples = &mut self.samples;
         let mut arrive = |sample: u32, light: Vec3| samples[sample as usize].radiance += light;
         if self.shadows.len() > 0 {
-            self.shadows.trace(self.context, &mut self.asking, &mut self.counts.shadow, &mut arrive);
+            self.shadows.trace((self.context, &mut self.media), &mut self.asking, &mut self.counts.shadow, &mut arrive);
         }
         if self.hotspots.len() > 0 {
-            self.hotspots.trace(self.context, &mut self.asking, &mut self.counts.shadow, &mut arrive);
+            self.hotspots.trace(
+                (self.context, &mut self.media),
+                &mut self.asking,
+                &mut self.counts.shadow,
+                &mut arrive,
+            );
         }
-        self.environment_rays.trace(self.context, &mut self.asking, &mut self.counts.shadow, arrive);
+        self.environment_rays.trace((self.context, &mut self.media), &mut self.asking, &mut self.counts.shadow, arrive);
     }
 
     /// Traces shadow rays once many wait. In between a sample sees one point at most, so that in whatever order these are
@@ -248,7 +258,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Adds what the surface at a hit shows by itself, and queues the rays that find the rest.
     pub(super) fn shade(&mut self, class: RayClass, Arrival { ray, hit, touches }: Arrival, path: &Path) {
         let context = self.context;
-        let lessened = context.absorption.is_some().then(|| context.absorption.lessened(ray, path, hit));
+        let lessened = context.absorption.is_some().then(|| context.absorption.lessened(&self.media, ray, path, hit));
         let (before, path) = (path, lessened.as_ref().unwrap_or(path));
         let target = HitPrim::new(context.scene, context.world, hit.prim);
         let material = target.material;
@@ -289,7 +299,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if context.no_prune {
             look_up_in_vain(&surface, context.textures);
         }
-        let crossing = point.crossing(context, path.band);
+        let crossing = point.crossing(context, &mut self.media, path.band);
         if context.no_prune || !bsdf.is_dark() {
             self.look_around(&point);
             self.light(&point, &crossing);

@@ -25,9 +25,9 @@ pub struct CellMargins {
     pub pad: f64,
     /// How much larger than its content the grid is on each side, relative to its extent.
     pub room: f64,
-    /// How far behind the best hit cells are still visited, relative to its distance …
+    /// How far behind the best hit cells are still visited, relative to its distance.
     pub lag: f64,
-    /// … and besides, where an ulp is no fraction of it.
+    /// How far at least, where an ulp is no fraction of its distance.
     pub underflow: f64,
     /// How far from the grid's corner a ray may start that is led through cells.
     pub ray_cells: f64,

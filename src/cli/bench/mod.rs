@@ -302,7 +302,7 @@ impl Bench<'_> {
         Ok((plan, left_out))
     }
 
-    /// The same plan for those of its structures that can keep instances, where these are kept.
+    /// A plan for those of its structures that can keep instances, where these are kept.
     fn able(&self, plan: Plan, prepared: &Prepared, name: &str, left_out: &mut Vec<AccelKind>) -> Result<Plan, Exit> {
         if prepared.world.instanced.is_empty() {
             return Ok(plan);

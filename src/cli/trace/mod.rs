@@ -49,7 +49,7 @@ struct Told<'a> {
     accel: AccelKind,
     settings: &'a Settings,
     eye: &'a View,
-    /// The same in words.
+    /// The view in words.
     view: &'a str,
     pixel: (u32, u32),
     sample: u32,

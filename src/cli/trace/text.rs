@@ -212,7 +212,7 @@ fn real(x: f64) -> String {
     resolved(x, f64::INFINITY)
 }
 
-/// The same with more digits where six do not tell what is no less than `resolution`.
+/// A number with as many digits as tell apart what differs by `resolution`, at least six.
 fn resolved(x: f64, resolution: f64) -> String {
     if x == 0.0 {
         return "0".into();

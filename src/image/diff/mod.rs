@@ -31,8 +31,8 @@ pub struct Difference {
     pub channels: u32,
     /// Root of the mean squared difference.
     pub rmse: f64,
-    /// The same, relative to the root of the mean square of what was expected, of which values that are no finite numbers
-    /// count as 0; infinite where that is black.
+    /// Root of the mean squared error, relative to the root of the mean square of what was expected, of which values that are no
+    /// finite numbers count as 0; infinite where that is black.
     pub relative_rmse: f64,
     /// Mean of what is there less what was expected, over the colour channels: what no noise explains.
     pub bias: f64,

@@ -434,7 +434,7 @@ fn is_readable(semantic: &Semantic, format: Format) -> bool {
     }
 }
 
-/// The same for what a morph target changes of it: colours may become less, and tangents have no handedness.
+/// Whether a morph target may change an attribute in such a format: colours may become less, and tangents have no handedness.
 fn can_change(attribute: &Semantic, format: Format) -> bool {
     let small = format.component != ComponentType::U32;
     match attribute {

@@ -74,7 +74,7 @@ impl Report {
         self.refuse_with(code, place, text, code.remedy());
     }
 
-    /// The same where something else helps than does mostly.
+    /// Refuses the file where something else helps than does mostly.
     pub(super) fn refuse_with(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>, remedy: &str) {
         let fault = Diagnostic::new(code.name(), &self.file, place.as_ref(), text).remedy(remedy);
         let kind = kind(&fault);
@@ -87,7 +87,7 @@ impl Report {
         self.warn_with(code, place, text, if code.row().verdict == Verdict::Warn { why } else { "" });
     }
 
-    /// The same where something else becomes of it than the table says.
+    /// Warns where something else becomes of it than the table says.
     pub(super) fn warn_with(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>, remedy: &str) {
         let warning = Diagnostic::new(code.name(), &self.file, place.as_ref(), text);
         let kind = kind(&warning);

@@ -28,7 +28,7 @@ pub(super) struct Textures<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Picture {
     pub(super) image: usize,
-    /// … in whose alpha gloss is a part of that of the material, of which these are the bits, and becomes roughness.
+    /// The bits of the material's gloss, of which the image's alpha is a part, and which becomes roughness.
     gloss: Option<u32>,
 }
 

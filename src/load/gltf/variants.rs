@@ -24,7 +24,7 @@ pub(super) fn material(primitive: &Primitive, variant: Option<usize>) -> Option<
     mapped.map(|(_, material)| material).or(primitive.material.map(|material| material.value()))
 }
 
-/// The same of a primitive as it stands in the JSON.
+/// The material that a primitive, as it stands in the JSON, shows in a variant.
 pub(super) fn material_in(primitive: &Value, variant: Option<usize>) -> Option<usize> {
     let extension = primitive.get("extensions").and_then(|e| e.get(NAME));
     let mapped = variant.and_then(|variant| mapped(extension, variant).next());

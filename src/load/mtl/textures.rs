@@ -27,7 +27,7 @@ const BUMP_HEIGHT: f64 = 1.0 / 64.0;
 pub(super) struct Textures {
     /// (Library, name as written) -> the picture's number, if it could be read.
     known: HashMap<(usize, String), Option<usize>>,
-    /// The same of the canonical path of each file: one may have many names.
+    /// Canonical path of a file -> its picture, if it could be read: one file may have many names.
     files: HashMap<PathBuf, Option<usize>>,
     pictures: Pictures,
     textures: Vec<Texture>,

@@ -62,7 +62,7 @@ impl<'a> Words<'a> {
         self.fault_at(self.line, text, remedy)
     }
 
-    /// The same of something that stood in an earlier line.
+    /// A fault of something that stood in an earlier line.
     pub(super) fn fault_at(&self, line: u32, text: impl Into<String>, remedy: &str) -> Diagnostic {
         Diagnostic::new("nff-syntax", self.file, line.to_string(), text).remedy(remedy)
     }

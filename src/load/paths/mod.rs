@@ -44,11 +44,11 @@ pub struct Resolver {
     from_stdin: bool,
     /// Folder that relative names start from; canonical.
     base: PathBuf,
-    /// The same as it was named.
+    /// The folder as the user named it.
     named: PathBuf,
     /// Nothing outside this folder is read; canonical.
     root: PathBuf,
-    /// Those of a file.
+    /// Limits of each file.
     limits: Limits,
     /// Each with what it counts for in the hash of all.
     read: Vec<(FileRead, u128)>,
@@ -239,7 +239,7 @@ impl Resolver {
         Ok(Found { bytes: self.read_file(&path)?, path, guessed })
     }
 
-    /// The same, if the file's bytes are left of the budget, from which they are taken before it is read.
+    /// Reads what a URI names, if the file's bytes are left of the budget, from which they are taken before it is read.
     pub fn read_uri_within(&mut self, uri: &str, budget: &mut Budget) -> Result<Result<Found, OverBudget>, FileFault> {
         let name = file_name_of_uri(uri)?;
         let (path, guessed) = self.find(&name, uri)?;
@@ -318,7 +318,7 @@ impl Resolver {
         Ok(bytes)
     }
 
-    /// The same, if its bytes are left of the budget, from which they are taken before it is read.
+    /// Reads a file by its name, if its bytes are left of the budget, from which they are taken before it is read.
     pub fn read_file_within(
         &mut self,
         name: &Path,

@@ -68,7 +68,7 @@ impl Making<'_> {
         taken.map_err(|over| Diagnostic::over_budget(self.file, over))
     }
 
-    /// The same of their colours.
+    /// Takes the memory of so many triangles' colours, before they are made.
     fn take_colors(&mut self, triangles: usize) -> Result<(), Diagnostic> {
         let taken = self.budget.take(triangles as u64, PlainMesh::COLOR);
         taken.map_err(|over| Diagnostic::over_budget(self.file, over))

@@ -9,9 +9,9 @@ use super::quotients::{Quotients, SURE, clamped, quotient};
 /// What bounds the rays of a row.
 #[derive(Clone, Copy, Debug)]
 pub struct RowBounds {
-    /// All origins lie between these.
+    /// The least of all origins, by axis.
     pub low: DVec3,
-    /// The same.
+    /// The largest of all origins, by axis.
     pub high: DVec3,
     /// The origin, where all rays have the same.
     pub from: Option<DVec3>,

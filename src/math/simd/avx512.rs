@@ -15,7 +15,7 @@ use super::{Axis, Kernel, LANES, Lanewise, LineOnStack, MIDDLE, NEAR_MIDDLE, Ord
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Avx512(Avx2);
 
-/// The same proof, for sixteen lanes.
+/// Proof that AVX-512 is there, for sixteen lanes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sixteen(Avx512);
 

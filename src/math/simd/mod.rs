@@ -58,7 +58,7 @@ pub trait Lanewise<const N: usize>: Copy {
     /// N numbers of double precision.
     type Doubles: Copy;
 
-    /// The same number in all lanes.
+    /// One number in all lanes.
     fn splat(self, x: f32) -> Self::Lanes;
     /// From memory.
     fn load(self, row: &[f32; N]) -> Self::Lanes;
@@ -133,9 +133,9 @@ pub trait Lanewise<const N: usize>: Copy {
     fn put_word(self, mask: u32, word: u32, to: &mut [u32; N]);
     /// Where a word stands.
     fn find_word(self, word: u32, among: &[u32; N]) -> u32;
-    /// The same number in all lanes.
+    /// One number in all lanes.
     fn splat_f64(self, x: f64) -> Self::Doubles;
-    /// The same numbers in double precision.
+    /// Numbers in double precision.
     fn widen(self, a: Self::Lanes) -> Self::Doubles;
     /// The nearest numbers in single precision.
     fn narrow(self, a: Self::Doubles) -> Self::Lanes;
@@ -190,11 +190,11 @@ pub trait Simd: Lanewise<LANES> {
     fn pick(self, rows: &[Row; 6], pick: Pick) -> Self::Lanes;
     /// Rows of four become columns: lane k of the i-th result is number i of the k-th row.
     fn columns(self, rows: [&[f32; 4]; LANES]) -> [Self::Lanes; 4];
-    /// The other way round.
+    /// Columns as rows again.
     fn rows(self, columns: [Self::Lanes; 4]) -> [[f32; 4]; LANES];
     /// To memory in another order: place k gets the lane, 0 to 7, that the `k`th four bits of `order` name.
     fn arrange(self, a: Self::Lanes, order: Order, to: &mut Row);
-    /// The same for eight words.
+    /// Puts eight words in an order.
     fn arrange_words(self, words: &[u32; LANES], order: Order, to: &mut [u32; LANES]);
     /// Those of eight numbers that are at these places, by the lowest three bits of each.
     fn among(self, table: &Row, places: &[u32; LANES]) -> Self::Lanes;

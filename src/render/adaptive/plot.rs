@@ -124,7 +124,7 @@ impl Plot {
     ) -> Option<()> {
         let pixel = self.lattice.pixel;
         for points in points.chunks(TOGETHER) {
-            tracer.reset(points.len(), frame.settings.layers);
+            tracer.reset(points.len(), frame.settings.layers, &frame.media);
             let eye = frame.eye(tracer.center());
             tracer.eyes.send(&eye, points.iter().map(|point| Lattice::place(frame, pixel, point.at)));
             if !tracer.trace() {

@@ -28,12 +28,12 @@ pub(crate) use sheen::SheenLobe;
 pub(crate) use spectrum::{Band, bands};
 
 use super::lobe_frame::LobeFrame;
+use super::media::Crossing;
 use super::optics::reflect;
 use super::patch::Patch;
 use super::sky::Sky;
 use super::surface::Surface;
 use super::texture::{ColorSpace, TextureStore};
-use super::wave::Crossing;
 use crate::math::{Vec3, Vec4};
 use crate::scene::{AlphaMode, Material, MetalRough, Reflection, TextureRef};
 use std::f32::consts::PI;

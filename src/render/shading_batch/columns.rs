@@ -13,6 +13,7 @@ use crate::math::bounds::offset_origin;
 use crate::math::simd::{Kernel, Level, Simd};
 use crate::math::{Vec3, Vec4};
 use crate::render::absorption::Absorption;
+use crate::render::media::MediaTable;
 use crate::render::patch::smooth_normal;
 use crate::render::shade::{Bsdf, ShadingFrame};
 use crate::render::shade_hits::TracedRays;
@@ -56,11 +57,11 @@ pub(super) fn leave(found: &Found, i: usize, dir: Vec3) -> Vec3 {
 pub(crate) struct ShadingBatch {
     pub(super) count: usize,
     pub(super) level: Level,
-    /// The place of each point's ray in its wave, …
+    /// The place of each point's ray in its wave.
     pub(super) rays: [u32; POINTS],
-    /// … the sample to which it belongs, …
+    /// The sample of each point.
     pub(super) samples: [u32; POINTS],
-    /// … and its weight; `None` where all are 1.
+    /// The weight of each point; `None` where all are 1.
     pub(super) weights: Option<Columns>,
     pub(super) given: Given,
     pub(super) found: Found,
@@ -150,7 +151,7 @@ impl ShadingBatch {
         &mut self,
         hit: &[(u32, u32)],
         sorted: &HitsByInstance,
-        (traced, absorption): (TracedRays, &Absorption),
+        (traced, absorption, media): (TracedRays, &Absorption, &MediaTable),
         smooth: bool,
     ) {
         self.count = hit.len().min(POINTS);
@@ -167,7 +168,7 @@ impl ShadingBatch {
                 let (ray, path, hit) = (&traced.rays()[at], &traced.path(at), &traced.hits()[at]);
                 self.samples[i] = ray.sample;
                 let absorbs = absorption.is_some();
-                put(weights, i, if absorbs { absorption.lessened(ray, path, hit).weight } else { path.weight });
+                put(weights, i, if absorbs { absorption.lessened(media, ray, path, hit).weight } else { path.weight });
             }
         }
         self.level.run(Gather { given: &mut self.given, hit: &hit[..self.count], sorted, traced, smooth });
@@ -399,11 +400,12 @@ mod tests {
     use crate::math::random::Random;
     use crate::math::{DMat3, DVec3};
     use crate::render::draws::SampleSet;
+    use crate::render::media::Media;
     use crate::render::shade::LocalLight;
     use crate::render::sky::Sky;
     use crate::render::sobol::mix;
     use crate::render::texture::TextureStore;
-    use crate::render::wave::{Media, Path, RayClass, Wave};
+    use crate::render::wave::{Path, RayClass, Wave};
     use crate::scene::{Environment, Falloff, Light, LightKind, Material, Scene};
 
     /// Random triangles hit in their middles.
@@ -422,13 +424,13 @@ mod tests {
         }
         let hit: Vec<(u32, u32)> = (0..61).map(|i| (i, i)).collect();
         let wave = wave(rays, hits);
-        let traced = (TracedRays::Wave(RayClass::Reflected, &wave), &Absorption::default());
+        let traced = (TracedRays::Wave(RayClass::Reflected, &wave), &Absorption::default(), &MediaTable::default());
         batch.take(&hit, &HitsByInstance::of_faces(faces), traced, true);
         batch
     }
 
     fn wave(rays: Vec<Ray>, hits: Vec<Hit>) -> Wave {
-        let paths = vec![Path::from_eye(0.0, 0.0, Media::default()); rays.len()];
+        let paths = vec![Path::from_eye(0.0, 0.0, Media::OUTSIDE); rays.len()];
         Wave { starts: true, after: vec![Hit::MISS; rays.len()], rays, paths, hits }
     }
 
@@ -483,7 +485,8 @@ mod tests {
         for level in Level::all() {
             for count in [1, 7, 8, 40, POINTS] {
                 let mut batch = ShadingBatch { level, ..ShadingBatch::default() };
-                let traced = (TracedRays::Wave(RayClass::Reflected, &wave), &Absorption::default());
+                let traced =
+                    (TracedRays::Wave(RayClass::Reflected, &wave), &Absorption::default(), &MediaTable::default());
                 batch.take(&hit[..count], &sorted, traced, true);
                 let given = &batch.given;
                 for (i, &(index, face)) in hit[..count].iter().enumerate() {

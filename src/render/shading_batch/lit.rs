@@ -10,10 +10,10 @@ use crate::accel::Ray;
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Simd};
 use crate::render::curve::STEEP;
+use crate::render::media::Media;
 use crate::render::shade::{Bsdf, Incident, LocalLight, Model, PhongBsdf, terminator, way};
 use crate::render::shade_hits::TracedRays;
 use crate::render::shadow::{Bound, ShadowQueue};
-use crate::render::wave::Media;
 
 /// Light whose shadow ray starts on the triangle.
 const PLAIN: u32 = 1;
@@ -124,7 +124,7 @@ impl ShadingBatch {
     /// Sends the shadow rays that start on their triangles, outside of everything where that matters.
     pub(crate) fn send(&self, shadows: &mut ShadowQueue, absorbs: bool) {
         let count = self.write(shadows.room());
-        shadows.take(count, std::iter::repeat_n(Media::default(), if absorbs { count } else { 0 }));
+        shadows.take(count, std::iter::repeat_n(Media::OUTSIDE, if absorbs { count } else { 0 }));
     }
 
     /// Sends the shadow rays, each starting in the media that the ray of its point is in.

@@ -17,11 +17,11 @@ use crate::render::asking::Asking;
 use crate::render::branch::ShadingPoint;
 use crate::render::context::Context;
 use crate::render::draws::Draws;
+use crate::render::media::{Media, MediaTable};
 use crate::render::observer::Observer;
 use crate::render::optics::reflect;
 use crate::render::shade::{Bsdf, above};
 use crate::render::shadow::{Bound, ShadowQueue};
-use crate::render::wave::Media;
 use std::f32::consts::PI;
 
 /// Ways to draw a direction.
@@ -126,7 +126,7 @@ impl EnvironmentRays {
     /// Traces all rays and hands what points show to `arrive`, as (sample, light) in an order that is always the same.
     pub(crate) fn trace<A: Accel, P: Observer>(
         &mut self,
-        context: &Context,
+        (context, media): (&Context, &mut MediaTable),
         asking: &mut Asking<A>,
         probe: &mut P,
         mut arrive: impl FnMut(u32, Vec3),
@@ -137,7 +137,7 @@ impl EnvironmentRays {
         self.arrived.clear();
         self.arrived.resize(self.shares.len(), Vec3::ZERO);
         let arrived = &mut self.arrived;
-        self.shadows.trace(context, asking, probe, |tag, light| arrived[tag as usize] += light);
+        self.shadows.trace((context, media), asking, probe, |tag, light| arrived[tag as usize] += light);
         let half = context.env_rays.div_ceil(2) as usize;
         let halves = self.shares.chunks_exact(2 * half).zip(self.arrived.chunks_exact(2 * half));
         for (point, (sent, come)) in self.points.iter().zip(halves) {

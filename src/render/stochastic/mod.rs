@@ -64,9 +64,9 @@ struct Sampler<'a> {
     how: &'a Stochastic,
     judge: Certainty<'a>,
     fireflies: Option<&'a Fireflies>,
-    /// First samples of each pixel that are traced before the picture, …
+    /// First samples of each pixel that are traced before the picture.
     first_samples: u32,
-    /// … and these, if they were kept: they are not where only what a picture takes is foretold.
+    /// The first samples, if they were kept: they are not where only what a picture takes is foretold.
     ahead: Option<&'a Ahead>,
     /// Samples of a pixel after each round.
     rounds: Vec<u32>,

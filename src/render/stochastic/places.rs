@@ -85,7 +85,7 @@ impl Places {
         tracer: &mut Tracer<A, P>,
     ) -> Option<()> {
         let Self { keys, indices, x, y } = self;
-        tracer.reset(keys.len(), frame.settings.layers);
+        tracer.reset(keys.len(), frame.settings.layers, &frame.media);
         tracer.roulette = roulette;
         let eye = frame.eye(tracer.center());
         let streams = keys.iter().zip(&*indices).map(|(&key, &index)| Stream { key, index });

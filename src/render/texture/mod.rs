@@ -89,7 +89,7 @@ impl<'a> TextureStore<'a> {
         Self { textures: &scene.textures, bitmaps: bitmaps.collect(), stand_in: None, surveys: Surveys::default() }
     }
 
-    /// The same, in which maps that are not there are read, too, for nothing (see [`no_prune`](super::no_prune)).
+    /// A store in which maps that are not there are read, too, for nothing (see [`no_prune`](super::no_prune)).
     #[must_use]
     pub fn without_pruning(self) -> Self {
         Self { stand_in: Some(Source::new(&super::no_prune::GREY)), ..self }
@@ -117,7 +117,7 @@ impl<'a> TextureStore<'a> {
         read
     }
 
-    /// The same at the first `count` of some places, by axis.
+    /// A number of a texture at the first `count` of some places, by axis.
     #[inline(always)]
     pub(in crate::render) fn channels<const CHANNEL: usize, const N: usize>(
         &self,

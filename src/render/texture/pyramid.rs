@@ -65,7 +65,7 @@ impl Pyramid {
         self.above[level - 1].get().unwrap_or_else(|| self.made(bitmap, space, level))
     }
 
-    /// The same, which is made unless another thread is quicker. It depends on the bitmap alone, so it does not matter which.
+    /// Makes a level, unless another thread is quicker. It depends on the bitmap alone, so it does not matter which.
     #[cold]
     #[inline(never)]
     fn made(&self, bitmap: &Bitmap, space: ColorSpace, level: usize) -> &Level {
@@ -120,7 +120,7 @@ impl Plane<'_> {
         self.at(y * self.width + x)
     }
 
-    /// The same by number, row by row.
+    /// A texel by number, row by row.
     #[inline(always)]
     pub(super) fn at(&self, index: usize) -> Vec4 {
         match self.texels {
@@ -174,7 +174,7 @@ fn halve(from: &Plane, to: (usize, usize), space: ColorSpace) -> Paged<[u16; 4]>
     texels
 }
 
-/// The same where each texel is the mean of exactly four, which come as upper left and right, lower left and right.
+/// Halves a level where each texel is the mean of exactly four, which come as upper left and right, lower left and right.
 fn halve_evenly<T>(texels: &[T], width: usize, mean: impl Fn([&T; 4]) -> [u16; 4]) -> Paged<[u16; 4]> {
     let mut halves = Paged::zeroed(texels.len() / 4);
     for (row, rows) in halves.chunks_exact_mut(width / 2).zip(texels.chunks_exact(2 * width)) {
@@ -185,7 +185,7 @@ fn halve_evenly<T>(texels: &[T], width: usize, mean: impl Fn([&T; 4]) -> [u16; 4
     halves
 }
 
-/// The same of texels without alpha that are no colours: a row of sums of two, and then of four, a texel in each word.
+/// Halves texels without alpha that are no colours: a row of sums of two, and then of four, a texel in each word.
 fn halve_numbers(texels: &[[u8; 3]], width: usize) -> Paged<[u16; 4]> {
     /// Of each number of a word 2, and all but its highest two bits.
     const TWO: u64 = 0x0002_0002_0002_0002;
@@ -241,7 +241,7 @@ fn word(codes: [u16; 4]) -> u64 {
     u64::from_le_bytes(bytemuck::cast(codes.map(u16::to_le)))
 }
 
-/// The same the other way round.
+/// The four codes of a word.
 #[inline(always)]
 fn codes_of(word: u64) -> [u16; 4] {
     bytemuck::cast::<_, [u16; 4]>(word.to_le_bytes()).map(u16::from_le)
@@ -260,7 +260,7 @@ fn mean_of_four(a: Vec4, b: Vec4, c: Vec4, d: Vec4, space: ColorSpace) -> Vec4 {
     (sum / plain.w).truncate().extend(plain.w)
 }
 
-/// The same of 8-bit texels, as it is stored; `light` has the colours as [`decode::fixed8`] gives them. Most pictures are
+/// The mean of four 8-bit texels, as it is stored; `light` has the colours as [`decode::fixed8`] gives them. Most pictures are
 /// solid, and then it is a matter of looking up and adding.
 #[inline(always)]
 fn mean8([a, b, c, d]: [&[u8; 4]; 4], colors: &[f32; 256], light: &[u32; 256], space: ColorSpace) -> [u16; 4] {

@@ -104,8 +104,7 @@ impl World {
         placing::placed_bytes(scene, scene.instances.iter())
     }
 
-    /// The same, but for meshes with several instances, with which `how` is dealt: rays hit the same prims at the same
-    /// distances.
+    /// Places every shape, and meshes with several instances as `how` says: rays hit the same prims at the same distances.
     pub fn placing(scene: &Scene, how: Instancing) -> Self {
         Placing::new(scene, how).world()
     }
@@ -121,7 +120,7 @@ impl World {
         self.structure_for(u64::MAX, choice, params)
     }
 
-    /// The same for pictures that begin with so many eye rays together: where these are few, finding out what suits them takes
+    /// A structure for pictures that begin with so many eye rays together: where these are few, finding out what suits them takes
     /// longer than it may save, and [`AccelChoice::Auto`] is `fast-octree`.
     ///
     /// # Panics
@@ -210,7 +209,7 @@ impl World {
         self.prim(hit.prim).refine(ray, hit)
     }
 
-    /// The same, in which no prim is opaque: each is asked what light it lets through (see [`no_prune`](super::no_prune)).
+    /// This world with no prim that is opaque: each is asked what light it lets through (see [`no_prune`](super::no_prune)).
     #[must_use]
     pub fn without_pruning(mut self) -> Self {
         self.shapes.opaque = BitSet::filled(self.shapes.len(), false);

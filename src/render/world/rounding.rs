@@ -66,7 +66,7 @@ impl World {
         solids.filter(|(_, part)| *part > most && part.is_finite()).chain(instance).max_by(worse)
     }
 
-    /// The same of instances.
+    /// The instance that rounding moves by the largest part of its size, if that is more than `most`.
     fn coarsest_instance(&self, scene: &Scene, most: f64) -> Option<(usize, f64)> {
         let mut from = 0;
         let mut worst: Option<(usize, f64)> = None;

@@ -256,8 +256,8 @@ fn first_corners(arities: &[u32]) -> Vec<u32> {
 /// Vertices, corners or faces that one thread looks at at a time.
 const MANY: usize = 1 << 12;
 
-/// The same as the statements of an OBJ would leave it: a run of plain faces, points and lines, and one of the faces that show
-/// each picture.
+/// What the statements of an OBJ would leave of it: a run of plain faces, points and lines, and one of the faces that show each
+/// picture.
 #[expect(clippy::cast_possible_truncation, reason = "readers keep below PlainMesh::LARGEST")]
 fn geometry(mut bare: PlainMesh, file: &Path, warnings: &mut Warnings) -> Geometry {
     if bare.is_of_plain_triangles() {

@@ -23,7 +23,7 @@ pub(in crate::load::gltf) struct Pose {
     pub(in crate::load::gltf) moved: HashMap<usize, Moved>,
     /// Weights of morph targets, by node.
     pub(in crate::load::gltf) weights: HashMap<usize, Vec<f32>>,
-    /// The same, by mesh: those of its nodes that have none of their own.
+    /// Weights of morph targets by mesh, for those of its nodes that have none of their own.
     pub(super) mesh_weights: HashMap<usize, Vec<f32>>,
     /// Whether it switches nodes on and off.
     pub(in crate::load::gltf) switches: bool,

@@ -55,9 +55,9 @@ impl Entry {
 /// What a pointer leads to.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::load::gltf) struct Pointed {
-    /// The part of the document that is changed …
+    /// The part of the document that is changed.
     pub(in crate::load::gltf) entry: Entry,
-    /// … and the steps from there.
+    /// The steps from there.
     pub(in crate::load::gltf) steps: Vec<String>,
     pub(super) form: Form,
 }

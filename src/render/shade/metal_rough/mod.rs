@@ -15,18 +15,18 @@ use super::highlight::{NARROWEST_HIGHLIGHT, highlight, is_narrow, least_square, 
 use super::{AnisotropicLobe, BounceWeights, Lobe, Reader, ShadingFrame, Sky, iridescence};
 use crate::math::formula::{exp2, root, smoothstep};
 use crate::math::{Vec3, Vec4};
+use crate::render::media::Crossing;
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, transmittance};
-use crate::render::wave::Crossing;
 use crate::scene::{DiffuseTransmission, Iridescence, MetalRough};
 use std::f32::consts::PI;
 
-/// Below this roughness the surroundings are seen by a ray alone …
+/// Below this roughness the surroundings are seen by a ray alone.
 const MIRROR_ROUGHNESS: f32 = 0.1;
-/// … and above this one by a lookup alone.
+/// Rougher surfaces see their surroundings by a lookup alone.
 const MATT_ROUGHNESS: f32 = crate::scene::features::SMOOTH;
 /// Above this roughness the lookup has its largest part in what is seen through glass.
 const FROSTED_ROUGHNESS: f32 = 0.6;
-/// That part; the rest goes straight through, so that glass never hides what it holds.
+/// The largest part that is looked up; the rest goes straight through, so that glass never hides what it holds.
 const FROSTED_SHARE: f32 = 0.75;
 /// The model's parameters at one point.
 #[derive(Clone, Copy, Debug)]

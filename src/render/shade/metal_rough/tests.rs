@@ -1,5 +1,5 @@
 use super::*;
-use crate::render::wave::{Media, Medium};
+use crate::render::media::{Media, MediaTable, Medium};
 
 fn bsdf() -> MetalRoughBsdf {
     MetalRoughBsdf {
@@ -105,7 +105,7 @@ fn seen_and_lit_can_change_places() {
 #[test]
 fn a_mirror_of_metal_has_the_color_of_its_base() {
     let metal = MetalRoughBsdf { metallic: 1.0, roughness: 0.0, ..bsdf() };
-    let outside = Media::default().cross(Medium { material: 0, ior: 1.0 }, true);
+    let outside = MediaTable::default().cross(Media::OUTSIDE, Medium { material: 0, ior: 1.0 }, true);
     assert_eq!(metal.bounce_weights(1.0, &outside, true).reflected, metal.base);
     assert_eq!(metal.bounce_weights(1.0, &outside, true).refracted, Vec3::ZERO);
     assert_eq!(MetalRoughBsdf { roughness: 0.5, ..metal }.bounce_weights(1.0, &outside, true).reflected, Vec3::ZERO);
@@ -114,8 +114,9 @@ fn a_mirror_of_metal_has_the_color_of_its_base() {
 #[test]
 fn clear_glass_splits_all_light_between_both_rays() {
     let glass = MetalRoughBsdf { base: Vec3::ONE, roughness: 0.0, transmission: 1.0, thick: true, ..bsdf() };
-    let into = Media::default().cross(Medium { material: 0, ior: 1.5 }, true);
-    let out = into.beyond.cross(Medium { material: 0, ior: 1.5 }, false);
+    let mut table = MediaTable::default();
+    let into = table.cross(Media::OUTSIDE, Medium { material: 0, ior: 1.5 }, true);
+    let out = table.cross(into.beyond, Medium { material: 0, ior: 1.5 }, false);
     for (crossing, outside) in [(into, true), (out, false)] {
         for cosine in [0.1, 0.5, 0.8, 1.0] {
             let bounce_weights = glass.bounce_weights(cosine, &crossing, outside);
@@ -128,7 +129,7 @@ fn clear_glass_splits_all_light_between_both_rays() {
 #[test]
 fn thick_glass_mirrors_in_the_colour_that_its_specular_factors_give() {
     let glass = MetalRoughBsdf { roughness: 0.0, transmission: 1.0, thick: true, ..bsdf() };
-    let into = Media::default().cross(Medium { material: 0, ior: 1.5 }, true);
+    let into = MediaTable::default().cross(Media::OUTSIDE, Medium { material: 0, ior: 1.5 }, true);
     let mirrored = |m: MetalRoughBsdf, cosine| m.bounce_weights(cosine, &into, true).reflected;
     for color in [Vec3::X, Vec3::ZERO, Vec3::new(0.5, 2.0, 1.0)] {
         let f0 = color * 0.04;
@@ -139,7 +140,11 @@ fn thick_glass_mirrors_in_the_colour_that_its_specular_factors_give() {
     assert!((mirrored(glass, 0.3).x - fresnel_dielectric(0.3, 1.0, 1.5) as f32).abs() < 1e-6);
     assert_eq!(mirrored(MetalRoughBsdf { f0: Vec3::ZERO, f90: 0.0, ..glass }, 0.3), Vec3::ZERO);
     let all = MetalRoughBsdf { f0: Vec3::ONE, ior: 0.0, ..glass };
-    assert_eq!(all.bounce_weights(0.7, &Media::default().pass(), true).reflected, Vec3::ONE, "index 0");
+    assert_eq!(
+        all.bounce_weights(0.7, &MediaTable::default().pass(Media::OUTSIDE), true).reflected,
+        Vec3::ONE,
+        "index 0"
+    );
 }
 
 #[test]

@@ -1,0 +1,268 @@
+//! The substances that rays are inside of, and what happens at their boundaries.
+
+use super::sobol::mix;
+
+/// One substance a ray is inside of.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Medium {
+    /// Index into the scene's materials.
+    pub material: u32,
+    /// Index of refraction.
+    pub ior: f32,
+}
+
+/// The substances a ray is inside of: a list in the [`MediaTable`] of the worker that traces it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Media(u32);
+
+impl Media {
+    /// Nothing but empty space.
+    pub(crate) const OUTSIDE: Self = Self(0);
+}
+
+/// What happens to a ray at the boundary of a substance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Crossing {
+    /// Index on the side the ray comes from.
+    pub n_i: f32,
+    /// Index on the other side.
+    pub n_t: f32,
+    /// What a ray that goes through is inside of afterwards.
+    pub beyond: Media,
+}
+
+impl Crossing {
+    /// How many times as far as normals directions turn that go through, when light falls in steeply.
+    pub(crate) fn turns(&self) -> f32 {
+        (1.0 - self.n_i / self.n_t).abs()
+    }
+}
+
+/// What rays are inside of, as lists of substances, the innermost last, each of which goes on from a shorter one.
+///
+/// After C. M. Schmidt and B. Budge, "Simple Nested Dielectrics in Ray Traced Images" (2002), with the most recently
+/// entered substance as the one that counts. A substance that was never entered may be left (an open mesh).
+///
+/// Each is there once: rays that have gone the same way share theirs.
+#[derive(Debug, Default)]
+pub(crate) struct MediaTable {
+    lists: Vec<List>,
+    /// Where each list is found by what it holds: the first free slot from the one that its hash names. At most half of them are
+    /// taken, of a power of two.
+    slots: Vec<Media>,
+}
+
+/// A substance that was entered from within another list.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct List {
+    innermost: Medium,
+    outer: Media,
+    len: u32,
+}
+
+impl List {
+    fn hash(&self) -> usize {
+        mix(mix(self.outer.0, self.innermost.material), self.innermost.ior.to_bits()) as usize
+    }
+}
+
+impl MediaTable {
+    /// Index of empty space.
+    const EMPTY_SPACE: f32 = 1.0;
+    /// Slots of a table that is not empty.
+    const LEAST: usize = 16;
+    /// Substances of a list at most, so that what is entered again and again and never left takes no more time with each.
+    /// What is entered then is the only one.
+    const MOST: u32 = 64;
+
+    /// Forgets all lists but that of these substances, the innermost last, in which rays start.
+    pub(crate) fn reset(&mut self, start: &[Medium]) -> Media {
+        if !self.lists.is_empty() {
+            self.lists.clear();
+            self.slots.clear();
+        }
+        start.iter().fold(Media::OUTSIDE, |media, &medium| self.enter(media, medium))
+    }
+
+    fn list(&self, media: Media) -> Option<&List> {
+        self.lists.get((media.0 as usize).checked_sub(1)?)
+    }
+
+    /// The substance that counts; `None` in empty space.
+    pub(crate) fn innermost(&self, media: Media) -> Option<Medium> {
+        self.list(media).map(|list| list.innermost)
+    }
+
+    fn ior(&self, media: Media) -> f32 {
+        self.innermost(media).map_or(Self::EMPTY_SPACE, |medium| medium.ior)
+    }
+
+    fn enter(&mut self, outer: Media, medium: Medium) -> Media {
+        let outer_len = self.list(outer).map_or(0, |list| list.len);
+        let (outer, len) = if outer_len < Self::MOST { (outer, outer_len + 1) } else { (Media::OUTSIDE, 1) };
+        self.find_or_make(List { innermost: medium, outer, len })
+    }
+
+    fn find_or_make(&mut self, list: List) -> Media {
+        if self.slots.len() <= 2 * self.lists.len() {
+            self.grow();
+        }
+        let slot = self.slot(&list);
+        if self.slots[slot] == Media::OUTSIDE {
+            self.lists.push(list);
+            #[expect(clippy::cast_possible_truncation, reason = "memory holds fewer")]
+            let made = Media(self.lists.len() as u32);
+            self.slots[slot] = made;
+        }
+        self.slots[slot]
+    }
+
+    /// Where a list is, or would be.
+    fn slot(&self, list: &List) -> usize {
+        let last = self.slots.len() - 1;
+        let mut slot = list.hash() & last;
+        while self.list(self.slots[slot]).is_some_and(|other| other != list) {
+            slot = (slot + 1) & last;
+        }
+        slot
+    }
+
+    fn grow(&mut self) {
+        let slots = (4 * self.lists.len()).next_power_of_two().max(Self::LEAST);
+        self.slots.clear();
+        self.slots.resize(slots, Media::OUTSIDE);
+        for (made, list) in (1..).zip(&self.lists) {
+            let slot = self.slot(list);
+            self.slots[slot] = Media(made);
+        }
+    }
+
+    /// The list without the last substance of this material, if it is in there.
+    fn leave(&mut self, media: Media, material: u32) -> Option<Media> {
+        let &List { innermost, outer, .. } = self.list(media)?;
+        if innermost.material == material {
+            return Some(outer);
+        }
+        let without = self.leave(outer, material)?;
+        Some(self.enter(without, innermost))
+    }
+
+    /// A surface with the same on both sides, which rays pass straight.
+    pub(crate) fn pass(&self, media: Media) -> Crossing {
+        let ior = self.ior(media);
+        Crossing { n_i: ior, n_t: ior, beyond: media }
+    }
+
+    /// The indices on both sides of the surface of `medium`, and the media beyond it, for a ray that comes from within `media`.
+    pub(crate) fn cross(&mut self, media: Media, medium: Medium, entering: bool) -> Crossing {
+        let here = self.ior(media);
+        if entering {
+            return Crossing { n_i: here, n_t: medium.ior, beyond: self.enter(media, medium) };
+        }
+        match self.leave(media, medium.material) {
+            Some(beyond) => Crossing { n_i: here, n_t: self.ior(beyond), beyond },
+            None => Crossing { n_i: medium.ior, n_t: here, beyond: media },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Random;
+
+    const GLASS: Medium = Medium { material: 1, ior: 1.5 };
+    const WATER: Medium = Medium { material: 2, ior: 1.33 };
+
+    fn indices(c: &Crossing) -> (f32, f32) {
+        (c.n_i, c.n_t)
+    }
+
+    #[test]
+    fn a_glass_of_water_is_crossed_with_the_right_indices() {
+        let mut table = MediaTable::default();
+        let into_glass = table.cross(Media::OUTSIDE, GLASS, true);
+        let into_water = table.cross(into_glass.beyond, WATER, true);
+        let out_of_water = table.cross(into_water.beyond, WATER, false);
+        let out_of_glass = table.cross(out_of_water.beyond, GLASS, false);
+        assert_eq!(indices(&into_glass), (1.0, 1.5));
+        assert_eq!(indices(&into_water), (1.5, 1.33));
+        assert_eq!(indices(&out_of_water), (1.33, 1.5));
+        assert_eq!(indices(&out_of_glass), (1.5, 1.0));
+        assert_eq!(out_of_glass.beyond, Media::OUTSIDE);
+    }
+
+    #[test]
+    fn leaving_the_outer_of_two_overlapping_substances_bends_nothing() {
+        let mut table = MediaTable::default();
+        let both = table.reset(&[GLASS, WATER]);
+        let out = table.cross(both, GLASS, false);
+        assert_eq!(indices(&out), (1.33, 1.33));
+        assert_eq!(indices(&table.cross(out.beyond, WATER, false)), (1.33, 1.0));
+    }
+
+    #[test]
+    fn a_substance_that_was_never_entered_can_be_left() {
+        let crossing = MediaTable::default().cross(Media::OUTSIDE, GLASS, false);
+        assert_eq!((indices(&crossing), crossing.beyond), ((1.5, 1.0), Media::OUTSIDE));
+    }
+
+    #[test]
+    fn what_is_entered_and_never_left_is_forgotten_some_time() {
+        let mut table = MediaTable::default();
+        let mut media = Media::OUTSIDE;
+        let medium = |material| Medium { material, ior: 2.0 + material as f32 };
+        for material in 0..1000 {
+            let crossing = table.cross(media, medium(material), true);
+            assert_eq!(crossing.n_t, medium(material).ior);
+            assert!(table.list(crossing.beyond).is_some_and(|list| list.len <= MediaTable::MOST));
+            media = crossing.beyond;
+        }
+        assert_eq!(table.innermost(media), Some(medium(999)));
+    }
+
+    #[test]
+    fn lists_hold_what_a_ray_has_entered_and_not_left_in_whatever_order_rays_go() {
+        let (mut random, mut table) = (Random::new(6), MediaTable::default());
+        let mut rays = vec![(Media::OUTSIDE, Vec::new()); 50];
+        for _ in 0..20_000 {
+            let at = random.below(50);
+            let (media, list) = &mut rays[at];
+            let (material, entering) = (random.below(12) as u32, random.below(2) == 0 && list.len() < 60);
+            let medium = Medium { material, ior: 1.0 + material as f32 };
+            let ior = |list: &[Medium]| list.last().map_or(1.0, |m| m.ior);
+            let before = ior(list);
+            let crossing = table.cross(*media, medium, entering);
+            match list.iter().rposition(|m: &Medium| m.material == material) {
+                _ if entering => list.push(medium),
+                Some(at) => drop(list.remove(at)),
+                None => assert_eq!((crossing.n_i, crossing.beyond), (medium.ior, *media)),
+            }
+            *media = crossing.beyond;
+            assert_eq!(crossing.n_t, ior(list));
+            if entering {
+                assert_eq!(crossing.n_i, before);
+            }
+            let mut held = Vec::new();
+            let mut left = *media;
+            while let Some(found) = table.list(left) {
+                held.push(found.innermost);
+                left = found.outer;
+            }
+            held.reverse();
+            assert_eq!(held, *list);
+        }
+    }
+
+    #[test]
+    fn rays_that_go_the_same_way_share_their_lists() {
+        let mut table = MediaTable::default();
+        for _ in 0..1000 {
+            let in_glass = table.cross(Media::OUTSIDE, GLASS, true).beyond;
+            let in_water = table.cross(in_glass, WATER, true).beyond;
+            assert_eq!(table.cross(in_water, WATER, false).beyond, in_glass);
+            assert_eq!(table.pass(in_water), Crossing { n_i: 1.33, n_t: 1.33, beyond: in_water });
+        }
+        assert_eq!(table.lists.len(), 2);
+    }
+}
