@@ -178,18 +178,18 @@
 
 pub mod accel;
 pub mod bench;
+mod catch_panic;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod generate;
+pub mod huge_pages;
 pub mod image;
 mod jpeg;
 pub mod load;
 pub mod math;
 pub mod named;
 pub mod number;
-pub mod pages;
 mod parts;
-mod quiet;
 pub mod render;
 pub mod save;
 pub mod scene;

@@ -206,9 +206,9 @@ fn trace([level, way, run, question]: [&str; 4]) -> ExitCode {
     };
     let wide = Wide::build(&shapes, Splitting::SurfaceArea).at_level(level).with_rays(way);
     let mut scratch = wide.scratch();
-    let mut answers = Answers { hits: vec![Hit::MISS; RAYS], blocked: vec![false; RAYS] };
+    let mut answers = Answers { hits: vec![Hit::MISS; RAYS], occluded: vec![false; RAYS] };
     counted(&wide, &rays(&shapes, run == "alike"), question == "any", &mut answers, &mut scratch);
-    let found = answers.hits.iter().filter(|h| h.is_some()).count() + answers.blocked.iter().filter(|&&b| b).count();
+    let found = answers.hits.iter().filter(|h| h.is_some()).count() + answers.occluded.iter().filter(|&&b| b).count();
     println!("{found} of {RAYS} rays hit");
     if found > RAYS / 4 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
@@ -334,14 +334,14 @@ fn counted_picture(job: &Job) -> usize {
 
 struct Answers {
     hits: Vec<Hit>,
-    blocked: Vec<bool>,
+    occluded: Vec<bool>,
 }
 
 /// What is counted: Callgrind knows it by its name.
 #[inline(never)]
 fn counted<A: Accel>(accel: &A, rays: &[Ray], any: bool, answers: &mut Answers, scratch: &mut A::Scratch) {
     if any {
-        accel.occluded(rays, &mut answers.blocked, scratch, &mut NoProbe);
+        accel.occluded(rays, &mut answers.occluded, scratch, &mut NoProbe);
     } else {
         accel.closest(rays, &mut answers.hits, scratch, &mut NoProbe);
     }

@@ -70,7 +70,7 @@ fn main() -> ExitCode {
         return ExitCode::FAILURE;
     }
     println!("{}", words.simd.name());
-    meshray::pages::allow(Duration::MAX);
+    meshray::huge_pages::allow(Duration::MAX);
     let shared = std::env::var_os("MESHRAY_SHARED").map_or_else(|| PathBuf::from("../shared"), PathBuf::from);
     let embree = std::env::var_os("MESHRAY_EMBREE").map(|path| Embree::load(Path::new(&path), words.simd)).transpose();
     let embree = match embree {

@@ -46,12 +46,12 @@ impl Tracer for Ours<'_> {
 
     fn trace(&self, any: bool, _: bool, rays: Rays, answers: &mut [Answer]) {
         let (pencil, rays) = (rays.pencil, rays.all);
-        let (scratch, hits, blocked) = &mut *self.buffers.borrow_mut();
+        let (scratch, hits, occluded) = &mut *self.buffers.borrow_mut();
         if any {
-            blocked.resize(rays.len(), false);
-            self.wide.occluded(rays, blocked, scratch, &mut NoProbe);
-            for (answer, blocked) in answers.iter_mut().zip(blocked) {
-                *answer = Answer { prim: if *blocked { 0 } else { NO_PRIM }, t: 0.0 };
+            occluded.resize(rays.len(), false);
+            self.wide.occluded(rays, occluded, scratch, &mut NoProbe);
+            for (answer, occluded) in answers.iter_mut().zip(occluded) {
+                *answer = Answer { prim: if *occluded { 0 } else { NO_PRIM }, t: 0.0 };
             }
         } else {
             hits.resize(rays.len(), Hit::MISS);

@@ -137,9 +137,9 @@ fn next<A: Accel>(accel: &A, rays: &[Ray], after: &[Hit]) -> Vec<Hit> {
 }
 
 fn occluded<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<bool> {
-    let mut blocked = vec![false; rays.len()];
-    accel.occluded(rays, &mut blocked, &mut accel.scratch(), &mut NoProbe);
-    blocked
+    let mut occluded = vec![false; rays.len()];
+    accel.occluded(rays, &mut occluded, &mut accel.scratch(), &mut NoProbe);
+    occluded
 }
 
 fn differences(a: &[Hit], b: &[Hit]) -> u64 {

@@ -21,7 +21,7 @@ use crate::tracer::{Answer, Rays, Tracer, packets};
 const PASSES: usize = 5;
 
 /// One way to find the hits of all rays.
-type Way<'a> = (String, bool, Box<dyn FnMut(&mut Vec<Hit>) + 'a>);
+type Candidate<'a> = (String, bool, Box<dyn FnMut(&mut Vec<Hit>) + 'a>);
 
 /// Judges on one model, `count` rays of each aim, and writes a page.
 pub(crate) fn run(file: &str, count: usize, page: &str) -> bool {
@@ -51,13 +51,13 @@ pub(crate) fn run(file: &str, count: usize, page: &str) -> bool {
     };
     let packed = packets(&rays);
     let both = Rays { all: &rays, packets: &packed, pencil: None };
-    let mut ways: Vec<Way> = Vec::new();
+    let mut candidates: Vec<Candidate> = Vec::new();
     for test in IntersectorKind::ALL {
         let tested = accel.clone().tested_by(test);
         let mut scratch = tested.scratch();
         let rays = &rays;
         let trace = move |hits: &mut Vec<Hit>| tested.closest(rays, hits, &mut scratch, &mut NoProbe);
-        ways.push((test.name().to_owned(), true, Box::new(trace)));
+        candidates.push((test.name().to_owned(), true, Box::new(trace)));
     }
     let modes = [(false, false), (false, true), (true, false), (true, true)];
     for (embree, (robust, packets)) in embree.iter().flat_map(|embree| modes.map(|mode| (embree, mode))) {
@@ -71,9 +71,9 @@ pub(crate) fn run(file: &str, count: usize, page: &str) -> bool {
                 *hit = Hit { t: answer.t, prim: answer.prim, ..Hit::MISS };
             }
         };
-        ways.push((name, false, Box::new(trace)));
+        candidates.push((name, false, Box::new(trace)));
     }
-    let kernels = measure(&oracle, &rays, &truths, ways);
+    let kernels = measure(&oracle, &rays, &truths, candidates);
     for kernel in &kernels {
         let wrong = match kernel.wrong_in_a_billion() {
             Rate::Seen(x) => format!("{x:.3e}"),
@@ -100,11 +100,11 @@ pub(crate) fn run(file: &str, count: usize, page: &str) -> bool {
     kernels.iter().filter(|k| k.name == IntersectorKind::Exact.name()).all(|k| k.tally.is_clean())
 }
 
-fn measure(oracle: &Oracle, rays: &[Ray], truths: &[Option<Truth>], mut ways: Vec<Way>) -> Vec<Kernel> {
+fn measure(oracle: &Oracle, rays: &[Ray], truths: &[Option<Truth>], mut candidates: Vec<Candidate>) -> Vec<Kernel> {
     let mut hits = vec![Hit::MISS; rays.len()];
-    let mut found: Vec<(Tally, Spread)> = vec![Default::default(); ways.len()];
+    let mut found: Vec<(Tally, Spread)> = vec![Default::default(); candidates.len()];
     for pass in 0..PASSES {
-        for ((_, _, trace), (tally, times)) in ways.iter_mut().zip(&mut found) {
+        for ((_, _, trace), (tally, times)) in candidates.iter_mut().zip(&mut found) {
             let ((), seconds) = processor_seconds(|| trace(&mut hits));
             times.push(seconds / rays.len().max(1) as f64);
             if pass == 0 {
@@ -112,11 +112,11 @@ fn measure(oracle: &Oracle, rays: &[Ray], truths: &[Option<Truth>], mut ways: Ve
             }
         }
     }
-    let kernel = |((name, is_ours, _), (tally, times)): (Way, (Tally, Spread))| Kernel {
+    let kernel = |((name, is_ours, _), (tally, times)): (Candidate, (Tally, Spread))| Kernel {
         name,
         is_ours,
         seconds_per_ray: times.median(),
         tally,
     };
-    ways.into_iter().zip(found).map(kernel).collect()
+    candidates.into_iter().zip(found).map(kernel).collect()
 }

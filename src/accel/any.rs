@@ -287,15 +287,15 @@ impl Accel for AnyAccel<'_> {
         &self,
         rays: &[Ray],
         filter: Option<&dyn OccludedFilter>,
-        blocked: &mut [bool],
+        occluded: &mut [bool],
         scratch: &mut AnyScratch,
         probe: &mut P,
     ) {
-        assert_eq!(rays.len(), blocked.len(), "a verdict for each ray");
+        assert_eq!(rays.len(), occluded.len(), "a verdict for each ray");
         if P::SILENT {
-            self.ask(Blocked { rays, filter, blocked, probe: &mut NoProbe }, scratch);
+            self.ask(OccludedQuestion { rays, filter, occluded, probe: &mut NoProbe }, scratch);
         } else {
-            self.ask(Blocked { rays, filter, blocked, probe }, scratch);
+            self.ask(OccludedQuestion { rays, filter, occluded, probe }, scratch);
         }
     }
 }
@@ -314,17 +314,17 @@ impl<P: Probe> Question for Looks<'_, P> {
     }
 }
 
-struct Blocked<'q, P> {
+struct OccludedQuestion<'q, P> {
     rays: &'q [Ray],
     filter: Option<&'q dyn OccludedFilter>,
-    blocked: &'q mut [bool],
+    occluded: &'q mut [bool],
     probe: &'q mut P,
 }
 
-impl<P: Probe> Question for Blocked<'_, P> {
+impl<P: Probe> Question for OccludedQuestion<'_, P> {
     const SILENT: bool = P::SILENT;
 
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
-        accel.occluded_filtered(self.rays, self.filter, self.blocked, scratch, self.probe);
+        accel.occluded_filtered(self.rays, self.filter, self.occluded, scratch, self.probe);
     }
 }

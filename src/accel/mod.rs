@@ -180,8 +180,8 @@ pub trait Accel: Sync {
     /// Whether anything *opaque* lies in `t_min..=t_max` of each ray: prims with a bit in [`Shapes::opaque`]. In a
     /// scene, faces of masked, blended and transmissive materials are opaque only where their maps let nothing through;
     /// whether anything at all lies there says [`Self::closest`].
-    fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P) {
-        self.occluded_filtered(rays, None, blocked, scratch, probe);
+    fn occluded<P: Probe>(&self, rays: &[Ray], occluded: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P) {
+        self.occluded_filtered(rays, None, occluded, scratch, probe);
     }
 
     /// [`Self::occluded`], and whether any other prim is in the way that stops light where a ray meets it, as `filter` decides.
@@ -189,7 +189,7 @@ pub trait Accel: Sync {
         &self,
         rays: &[Ray],
         filter: Option<&dyn OccludedFilter>,
-        blocked: &mut [bool],
+        occluded: &mut [bool],
         scratch: &mut Self::Scratch,
         probe: &mut P,
     );

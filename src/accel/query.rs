@@ -510,11 +510,11 @@ impl<C: Culling> Accel for C {
         &self,
         rays: &[Ray],
         filter: Option<&dyn OccludedFilter>,
-        blocked: &mut [bool],
+        occluded: &mut [bool],
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        self.trace(&mut OccludedBatch { rays, filter, blocked, test: Exact }, scratch, probe);
+        self.trace(&mut OccludedBatch { rays, filter, occluded, test: Exact }, scratch, probe);
     }
 }
 
@@ -552,10 +552,10 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
         &self,
         rays: &[Ray],
         filter: Option<&dyn OccludedFilter>,
-        blocked: &mut [bool],
+        occluded: &mut [bool],
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        self.structure.trace(&mut OccludedBatch { rays, filter, blocked, test: self.test }, scratch, probe);
+        self.structure.trace(&mut OccludedBatch { rays, filter, occluded, test: self.test }, scratch, probe);
     }
 }

@@ -166,7 +166,7 @@ impl<'w, I: Intersector> QueryBatch for ClosestBatch<'w, I> {
 pub(super) struct OccludedBatch<'w, I> {
     pub rays: &'w [Ray],
     pub filter: Option<&'w dyn OccludedFilter>,
-    pub blocked: &'w mut [bool],
+    pub occluded: &'w mut [bool],
     pub test: I,
 }
 
@@ -185,19 +185,19 @@ impl<'w, I: Intersector> QueryBatch for OccludedBatch<'w, I> {
 
     #[inline(always)]
     fn take(&mut self, i: usize, hit: Hit) {
-        self.blocked[i] = hit.is_some();
+        self.occluded[i] = hit.is_some();
     }
 
     #[inline(always)]
     fn take_all(&mut self, start: usize, hits: &[Hit]) {
-        let blocked = &mut self.blocked[start..start + hits.len()];
-        blocked.iter_mut().zip(hits).for_each(|(blocked, hit)| *blocked = hit.is_some());
+        let occluded = &mut self.occluded[start..start + hits.len()];
+        occluded.iter_mut().zip(hits).for_each(|(occluded, hit)| *occluded = hit.is_some());
     }
 
     #[inline]
     fn answer(&mut self, i: usize, query: &Query<Occluded<'w, I>>) -> bool {
-        self.blocked[i] = query.goal.found;
-        self.blocked[i]
+        self.occluded[i] = query.goal.found;
+        self.occluded[i]
     }
 }
 

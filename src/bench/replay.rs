@@ -3,7 +3,7 @@
 use super::clock::timed;
 use super::rays::Batch;
 use crate::accel::{Accel, Hit, NoProbe, OccludedFilter, Probe, Ray, RayCounts};
-use crate::render::{Filters, Noted, Question};
+use crate::render::{FilterScratch, Filters, Question};
 use crate::threads;
 use std::thread;
 
@@ -16,9 +16,9 @@ pub type Answer = [u32; 4];
 /// Answers all rays of a batch.
 pub fn answers<A: Accel>(accel: &A, filters: Option<&Filters>, batch: &Batch) -> Vec<Answer> {
     let mut answers = Vec::with_capacity(batch.rays.len());
-    let mut asking = Asking::new(accel, filters);
+    let mut replayer = Replayer::new(accel, filters);
     Slice::cut(batch.question, &batch.rays, &batch.after)
-        .for_each(|slice| asking.ask(&slice, &mut NoProbe, |answer| answers.push(answer)));
+        .for_each(|slice| replayer.ask(&slice, &mut NoProbe, |answer| answers.push(answer)));
     answers
 }
 
@@ -30,7 +30,7 @@ pub fn counted<A: Accel>(
     mut each: impl FnMut(&Ray, &RayCounts),
 ) -> Vec<Answer> {
     let mut answers = Vec::with_capacity(batch.rays.len());
-    let mut asking = Asking::new(accel, filters);
+    let mut replayer = Replayer::new(accel, filters);
     for i in 0..batch.rays.len() {
         let mut counts = RayCounts::default();
         let alone = Slice {
@@ -38,7 +38,7 @@ pub fn counted<A: Accel>(
             rays: &batch.rays[i..=i],
             after: batch.after.get(i..=i).unwrap_or_default(),
         };
-        asking.ask(&alone, &mut counts, |answer| answers.push(answer));
+        replayer.ask(&alone, &mut counts, |answer| answers.push(answer));
         each(&batch.rays[i], &counts);
     }
     answers
@@ -49,9 +49,9 @@ pub fn counted<A: Accel>(
 pub fn seconds<A: Accel>(accel: &A, filters: Option<&Filters>, batch: &Batch, times: u32, threads: usize) -> f64 {
     let share = batch.rays.len().div_ceil(threads.max(1)).max(1);
     let work = |slices: Vec<Slice>| {
-        let mut asking = Asking::new(accel, filters);
+        let mut replayer = Replayer::new(accel, filters);
         for _ in 0..times {
-            slices.iter().for_each(|slice| asking.ask_only(slice));
+            slices.iter().for_each(|slice| replayer.ask_only(slice));
         }
     };
     let shares = |i: usize| {
@@ -83,45 +83,45 @@ impl<'a> Slice<'a> {
 }
 
 /// A structure, its scratch, and room for the answers.
-struct Asking<'a, A: Accel> {
+struct Replayer<'a, A: Accel> {
     accel: &'a A,
     filters: Option<&'a Filters<'a>>,
-    noted: Noted,
+    noted: FilterScratch,
     scratch: A::Scratch,
     hits: [Hit; SLICE],
-    blocked: [bool; SLICE],
+    occluded: [bool; SLICE],
 }
 
-impl<'a, A: Accel> Asking<'a, A> {
+impl<'a, A: Accel> Replayer<'a, A> {
     fn new(accel: &'a A, filters: Option<&'a Filters<'a>>) -> Self {
-        let noted = Noted::default();
-        Self { accel, filters, noted, scratch: accel.scratch(), hits: [Hit::MISS; SLICE], blocked: [false; SLICE] }
+        let noted = FilterScratch::default();
+        Self { accel, filters, noted, scratch: accel.scratch(), hits: [Hit::MISS; SLICE], occluded: [false; SLICE] }
     }
 
     /// The answers stay where they are, so that nothing else is timed.
     fn ask_only(&mut self, slice: &Slice) {
         self.fill(slice, &mut NoProbe);
-        std::hint::black_box((&self.hits, &self.blocked));
+        std::hint::black_box((&self.hits, &self.occluded));
     }
 
     fn ask<P: Probe>(&mut self, slice: &Slice, probe: &mut P, mut answer: impl FnMut(Answer)) {
         self.fill(slice, probe);
         let count = slice.rays.len();
         match slice.question {
-            Question::Occluded => self.blocked[..count].iter().for_each(|&b| answer([u32::from(b), 0, 0, 0])),
+            Question::Occluded => self.occluded[..count].iter().for_each(|&b| answer([u32::from(b), 0, 0, 0])),
             _ => self.hits[..count].iter().for_each(|hit| answer(hit.bits())),
         }
     }
 
     fn fill<P: Probe>(&mut self, slice: &Slice, probe: &mut P) {
         let count = slice.rays.len();
-        let (hits, blocked) = (&mut self.hits[..count], &mut self.blocked[..count]);
+        let (hits, occluded) = (&mut self.hits[..count], &mut self.occluded[..count]);
         match slice.question {
             Question::Closest => self.accel.closest(slice.rays, hits, &mut self.scratch, probe),
             Question::Occluded => {
-                let filter = self.filters.map(|filters| filters.before(slice.rays, &mut self.noted));
+                let filter = self.filters.map(|filters| filters.for_rays(slice.rays, &mut self.noted));
                 let filter = filter.as_ref().map(|filter| filter as &dyn OccludedFilter);
-                self.accel.occluded_filtered(slice.rays, filter, blocked, &mut self.scratch, probe);
+                self.accel.occluded_filtered(slice.rays, filter, occluded, &mut self.scratch, probe);
             }
             Question::Next => self.accel.next(slice.rays, slice.after, hits, &mut self.scratch, probe),
         }

@@ -159,11 +159,11 @@ impl Accel for Blind<'_> {
         &self,
         rays: &[Ray],
         filter: Option<&dyn OccludedFilter>,
-        blocked: &mut [bool],
+        occluded: &mut [bool],
         scratch: &mut (),
         probe: &mut P,
     ) {
-        self.0.occluded_filtered(rays, filter, blocked, scratch, probe);
+        self.0.occluded_filtered(rays, filter, occluded, scratch, probe);
     }
 }
 

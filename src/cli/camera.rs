@@ -1,7 +1,7 @@
 //! From what the user chose to a camera in the scene.
 
 use super::args::EyeArgs;
-use super::job::{UsageError, wrong};
+use super::job::{UsageError, usage_error};
 use super::parse::Ortho;
 use crate::load::Diagnostic;
 use crate::load::choice::{Kind, choose};
@@ -186,7 +186,7 @@ impl Shown<'_> {
 /// Refuses an eye that looks at itself.
 pub(super) fn check_eye(eye: Option<[f64; 3]>, at: Option<[f64; 3]>) -> Result<(), UsageError> {
     if eye.is_some() && eye == at {
-        return wrong("--eye and --at are one point, so the camera looks nowhere; move one");
+        return usage_error("--eye and --at are one point, so the camera looks nowhere; move one");
     }
     Ok(())
 }

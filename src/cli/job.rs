@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct UsageError(pub String);
 
 /// The error of such a command line.
-pub(super) fn wrong<T>(text: impl Into<String>) -> Result<T, UsageError> {
+pub(super) fn usage_error<T>(text: impl Into<String>) -> Result<T, UsageError> {
     Err(UsageError(text.into()))
 }
 
@@ -175,7 +175,7 @@ impl RenderJob {
         outputs::check_stats_file(stats.as_ref(), &batches, beside(args))?;
         let to_stdout = batches.iter().flat_map(|b| &b.shots).any(|s| s.target == Target::Stdout);
         if to_stdout && !args.dry_run && stats.as_ref().is_some_and(|s| s.file.is_none()) {
-            return wrong("the picture goes to standard output, so the statistics cannot; add --stats-file PATH");
+            return usage_error("the picture goes to standard output, so the statistics cannot; add --stats-file PATH");
         }
         Ok(Self {
             load: args.load.options(),
@@ -229,11 +229,11 @@ fn instances(args: &RenderArgs) -> Result<Instancing, UsageError> {
     let able = keeps_instances(args.accel);
     let exact = args.intersector == IntersectorKind::Exact;
     match args.instances {
-        Instancing::Keep if !able => wrong(format!(
+        Instancing::Keep if !able => usage_error(format!(
             "--instances keep: {} stores each instance by itself; use --accel fast-octree, fast-bvh or auto",
             args.accel
         )),
-        Instancing::Keep if !exact => wrong(format!(
+        Instancing::Keep if !exact => usage_error(format!(
             "--instances keep goes with the exact test alone, not with --intersector {}",
             args.intersector
         )),
@@ -245,38 +245,38 @@ fn instances(args: &RenderArgs) -> Result<Instancing, UsageError> {
 /// Refuses to read standard input twice.
 pub(super) fn check_stdin(inputs: &[PathBuf]) -> Result<(), UsageError> {
     let times = inputs.iter().filter(|input| input.as_path() == Path::new("-")).count();
-    if times > 1 { wrong("standard input (`-`) can be read only once") } else { Ok(()) }
+    if times > 1 { usage_error("standard input (`-`) can be read only once") } else { Ok(()) }
 }
 
 fn check_flags(args: &RenderArgs) -> Result<(), UsageError> {
     check_stdin(&args.inputs)?;
     if args.inputs.is_empty() {
-        return wrong("no input; name a model");
+        return usage_error("no input; name a model");
     }
     if args.eye.is_none() && (args.at.is_some() || args.up_vector.is_some()) {
-        return wrong("--at and --up-vector belong to --eye; say where the camera stands");
+        return usage_error("--at and --up-vector belong to --eye; say where the camera stands");
     }
     camera::check_eye(args.eye, args.at)?;
     if args.eye.is_some() && !(args.view.is_empty() && args.camera.is_empty()) {
-        return wrong("--eye places the camera, so --view and --camera cannot; use one of them");
+        return usage_error("--eye places the camera, so --view and --camera cannot; use one of them");
     }
     if args.merge && args.load.scene.is_some() {
-        return wrong("--scene chooses a scene of one file and cannot be used with --merge");
+        return usage_error("--scene chooses a scene of one file and cannot be used with --merge");
     }
     if args.merge && args.load.variant.is_some() {
-        return wrong("--variant chooses materials of one file and cannot be used with --merge");
+        return usage_error("--variant chooses materials of one file and cannot be used with --merge");
     }
     if args.env_rotate.is_some() && !matches!(args.env, Some(Env::File(_))) {
-        return wrong("--env-rotate turns a picture; the built-in surroundings stay with the model");
+        return usage_error("--env-rotate turns a picture; the built-in surroundings stay with the model");
     }
     if args.merge && args.load.moment.animation.is_some() {
-        return wrong("--animation chooses an animation of one file and cannot be used with --merge");
+        return usage_error("--animation chooses an animation of one file and cannot be used with --merge");
     }
     if args.profile && args.quiet && args.stats.is_none() {
-        return wrong("--profile tells where the time went, and --quiet silences it; leave one of them out");
+        return usage_error("--profile tells where the time went, and --quiet silences it; leave one of them out");
     }
     if args.stats_file.is_some() && args.stats.is_none() && !args.dry_run {
-        return wrong("--stats-file needs --stats text or --stats json");
+        return usage_error("--stats-file needs --stats text or --stats json");
     }
     Ok(())
 }
@@ -340,18 +340,18 @@ fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), UsageError> {
     }
     let all = |kind| batches.iter().flat_map(|b| &b.shots).all(|s| s.kind == kind);
     if (args.layers.is_some() || args.float || args.half) && !all(FileKind::Exr) {
-        return wrong("--layers, --half and --float belong to EXR; use -o NAME.exr or --format exr");
+        return usage_error("--layers, --half and --float belong to EXR; use -o NAME.exr or --format exr");
     }
     if args.bits == Some(16) && !all(FileKind::Png) {
-        return wrong("--bits 16 belongs to PNG; an EXR stores floats, the other types 8 bits");
+        return usage_error("--bits 16 belongs to PNG; an EXR stores floats, the other types 8 bits");
     }
     if args.bits.is_some() && all(FileKind::Exr) {
-        return wrong("--bits belongs to PNG; an EXR stores floats, of 16 bits, or 32 with --float");
+        return usage_error("--bits belongs to PNG; an EXR stores floats, of 16 bits, or 32 with --float");
     }
     // A picture that is repeated carries both, whatever it is; and errors may be counted in colours for a display.
     let serves = args.again.is_some() || args.sampling.error_space == Some(SpaceArg::Display);
     if (args.tone_map.is_some() || args.exposure.is_some()) && all(FileKind::Exr) && !serves {
-        return wrong(
+        return usage_error(
             "--tone-map and --exposure make colours for a display; an EXR keeps the light as it is (with --error-space display \
              its errors are counted in them)",
         );

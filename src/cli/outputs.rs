@@ -2,7 +2,7 @@
 
 use super::args::RenderArgs;
 use super::camera::Choice;
-use super::job::{Batch, Shot, Stats, UsageError, wrong};
+use super::job::{Batch, Shot, Stats, UsageError, usage_error};
 use super::output_name::{self, Fields, Naming};
 use crate::image::FileKind;
 use crate::load::Diagnostic;
@@ -61,7 +61,7 @@ pub(super) fn target(
     let usual = |folder| output_name::default_template(folder, naming, format.unwrap_or(FileKind::Png).extension());
     let (template, kept): (String, fn(PathBuf) -> Target) = match args.output.as_deref() {
         Some("-") => return Ok((Target::Stdout, format.unwrap_or(FileKind::Png), None)),
-        Some("") => return wrong("-o needs a name"),
+        Some("") => return usage_error("-o needs a name"),
         Some(folder) if folder.ends_with(is_separator) || Path::new(folder).is_dir() => {
             (usual(Some(folder)), Target::Default)
         }
@@ -78,10 +78,10 @@ pub(super) fn target(
     let kind = match (format, FileKind::from_path(&path)) {
         (Some(typed), Ok(named)) if typed != named => {
             let (path, format) = (path.display(), typed.extension());
-            return wrong(format!("{path} is called {named}, but --format says {format}; say it in one place"));
+            return usage_error(format!("{path} is called {named}, but --format says {format}; say it in one place"));
         }
         (Some(kind), _) | (None, Ok(kind)) => kind,
-        (None, Err(e)) => return wrong(format!("{e}, or say --format")),
+        (None, Err(e)) => return usage_error(format!("{e}, or say --format")),
     };
     Ok((kept(path), kind, growth))
 }
@@ -158,7 +158,7 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), UsageError> {
     if to_stdout > 1 {
         let numbered = shots.iter().any(|(_, shot)| shot.step.number.is_some());
         let name = if numbered { "{stem}.{frame:04}.png" } else { "{stem}-{view}.png" };
-        return wrong(format!("{to_stdout} pictures cannot all go to standard output; use -o \"{name}\""));
+        return usage_error(format!("{to_stdout} pictures cannot all go to standard output; use -o \"{name}\""));
     }
     let names: Vec<PathBuf> = shots.iter().filter_map(|(_, s)| s.target.path().map(Path::to_path_buf)).collect();
     let Some((a, b)) = output_name::collision(&names) else { return Ok(()) };
@@ -170,12 +170,12 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), UsageError> {
         format!("{}{parts}", input.display())
     };
     if shots[a].0 == shots[b].0 && what(a) == what(b) {
-        return wrong(format!("{} is asked for twice; name it once", what(a)));
+        return usage_error(format!("{} is asked for twice; name it once", what(a)));
     }
     // Most often one model in two types of file.
     let types = [a, b].map(|i| shots[i].0.extension());
     let example = if types[0] == types[1] { "" } else { ", as in 'thumbs/{sub}/{stem}.{ext}.png'" };
-    wrong(format!(
+    usage_error(format!(
         "{} and {} would both be written to {}; use {{dir}}, {{sub}}, {{stem}}, {{ext}}, {{view}} or {{frame:04}} in -o{example}",
         what(a),
         what(b),
@@ -188,21 +188,21 @@ pub(super) fn check_beside(batches: &[Batch], beside: Beside) -> Result<(), Usag
     let shots = || batches.iter().flat_map(|b| &b.shots);
     let heatmaps = beside.heatmaps;
     if let Some(twice) = heatmaps.iter().enumerate().find(|(i, cost)| heatmaps[..*i].contains(cost)) {
-        return wrong(format!("--heatmap names {} twice", twice.1));
+        return usage_error(format!("--heatmap names {} twice", twice.1));
     }
     let to_stdout = shots().any(|s| s.target == Target::Stdout);
     if !heatmaps.is_empty() && to_stdout {
-        return wrong("a heat map is named after its picture, and standard output has no name; use -o NAME");
+        return usage_error("a heat map is named after its picture, and standard output has no name; use -o NAME");
     }
     if beside.partial && to_stdout {
         let text = "--keep-partial names what it keeps after the picture, and standard output has no name; use -o NAME, \
                     or leave --keep-partial out";
-        return wrong(text);
+        return usage_error(text);
     }
     let all = files(shots(), beside);
     match output_name::collision(&all) {
         Some((_, later)) => {
-            wrong(format!("two pictures would be written to {}; choose another -o", all[later].display()))
+            usage_error(format!("two pictures would be written to {}; choose another -o", all[later].display()))
         }
         None => Ok(()),
     }
@@ -215,7 +215,7 @@ pub(super) fn check_stats_file(stats: Option<&Stats>, batches: &[Batch], beside:
     let target = output_name::identity(file);
     if names.iter().any(|name| output_name::identity(name) == target) {
         let file = file.display();
-        return wrong(format!(
+        return usage_error(format!(
             "a picture and the statistics would both be written to {file}; name another --stats-file"
         ));
     }

@@ -11,7 +11,7 @@ use super::message::Messages;
 use super::outputs::Target;
 use super::panics;
 use super::progress::Progress;
-use super::render::{self, SoFar};
+use super::render::{self, RunState};
 use crate::image::was_written_by_meshray;
 use crate::load::archive;
 use crate::load::is_called_a_model;
@@ -52,7 +52,7 @@ impl Ended {
 
 /// Renders all inputs, or as many as there are until a signal comes: those that are small side by side, where that pays, then the
 /// others one by one.
-pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, so_far: &mut SoFar) -> Ended {
+pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, run_state: &mut RunState) -> Ended {
     let lanes = if may_go_side_by_side(job) { pool.current_num_threads() } else { 1 };
     let (mut small, mut others) = (Vec::new(), Vec::new());
     let mut sizes = Sizes { has_size: job.look.size.is_some(), beside: HashMap::new() };
@@ -61,7 +61,7 @@ pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, so_fa
     }
     let mut ended = Ended::WELL;
     if small.len() >= MANY * lanes {
-        ended = side_by_side(job, &small, (lanes, pool), messages, so_far);
+        ended = side_by_side(job, &small, (lanes, pool), messages, run_state);
     } else {
         others = job.batches.iter().collect();
     }
@@ -69,8 +69,8 @@ pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, so_fa
         if interrupt::raised() {
             break;
         }
-        let shots = render::writable_shots(job, batch, messages, so_far);
-        ended.and(guarded(job, batch, shots, pool, messages, so_far));
+        let shots = render::writable_shots(job, batch, messages, run_state);
+        ended.and(guarded(job, batch, shots, pool, messages, run_state));
     }
     ended
 }
@@ -162,10 +162,10 @@ fn guarded(
     (shots, worst): Writable,
     pool: &ThreadPool,
     messages: &Messages,
-    so_far: &mut SoFar,
+    run_state: &mut RunState,
 ) -> Exit {
     let name = batch.inputs[0].display().to_string();
-    let work = || pool.install(|| render::render_batch(job, batch, &shots, messages, so_far));
+    let work = || pool.install(|| render::render_batch(job, batch, &shots, messages, run_state));
     worst.max(panics::guard(&name, messages, work))
 }
 
@@ -174,12 +174,12 @@ fn side_by_side(
     batches: &[&Batch],
     (lanes, pool): (usize, &ThreadPool),
     messages: &Messages,
-    so_far: &mut SoFar,
+    run_state: &mut RunState,
 ) -> Ended {
     let progress = Progress::new(&format!("{} inputs", batches.len()), messages, job.quiet, false);
     progress.begin("rendering");
     let waiting = batches.iter().map(|_| None).collect();
-    let state = State { next: 0, finished: 0, told: 0, waiting, so_far, ended: Ended::WELL };
+    let state = State { next: 0, finished: 0, told: 0, waiting, run_state, ended: Ended::WELL };
     let queue = Queue { job, batches, messages, progress, state: Mutex::new(state) };
     std::thread::scope(|scope| {
         for _ in 0..lanes {
@@ -213,14 +213,14 @@ struct State<'s> {
     told: usize,
     /// What came of others, until those before them are told.
     waiting: Vec<Option<Finished>>,
-    so_far: &'s mut SoFar,
+    run_state: &'s mut RunState,
     ended: Ended,
 }
 
 /// What came of an input.
 struct Finished {
     messages: Messages,
-    so_far: SoFar,
+    run_state: RunState,
     exit: Exit,
 }
 
@@ -233,21 +233,21 @@ impl<'a, 's> Queue<'a, 's> {
     /// What a lane does.
     fn work(&self, pool: &ThreadPool) {
         while !interrupt::raised() {
-            let Some((number, messages, shots, mut so_far)) = self.take() else { break };
-            let exit = guarded(self.job, self.batches[number], shots, pool, &messages, &mut so_far);
-            self.put(number, Finished { messages, so_far, exit });
+            let Some((number, messages, shots, mut run_state)) = self.take() else { break };
+            let exit = guarded(self.job, self.batches[number], shots, pool, &messages, &mut run_state);
+            self.put(number, Finished { messages, run_state, exit });
         }
     }
 
     /// The next input, with messages of its own. Whether its pictures may be written is asked in the order of inputs.
-    fn take(&self) -> Option<(usize, Messages, Writable<'a>, SoFar)> {
+    fn take(&self) -> Option<(usize, Messages, Writable<'a>, RunState)> {
         let mut state = self.state();
         let number = state.next;
         let batch = *self.batches.get(number)?;
         state.next += 1;
         let messages = self.messages.apart();
-        let shots = render::writable_shots(self.job, batch, &messages, state.so_far);
-        let own = state.so_far.of_one();
+        let shots = render::writable_shots(self.job, batch, &messages, state.run_state);
+        let own = state.run_state.of_one();
         Some((number, messages, shots, own))
     }
 
@@ -264,9 +264,9 @@ impl<'a, 's> Queue<'a, 's> {
         self.progress.advance(state.finished, self.batches.len());
     }
 
-    fn tell(&self, state: &mut State, Finished { messages, so_far, exit }: Finished) {
+    fn tell(&self, state: &mut State, Finished { messages, run_state, exit }: Finished) {
         self.messages.tell(&messages);
-        state.so_far.add(so_far);
+        state.run_state.add(run_state);
         state.ended.and(exit);
     }
 

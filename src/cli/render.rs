@@ -13,10 +13,10 @@ use super::shot::{self, Stage, Task};
 use super::stats::{self, PictureStats};
 use super::writable::{self, Sources};
 use super::{again, empty_picture, interrupt, parallel_inputs, read, surroundings, up_to_date};
+use crate::huge_pages;
 use crate::image::destination;
 use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded};
 use crate::number::so_many;
-use crate::pages;
 use crate::render::{Moved, Sampling, World};
 use crate::scene::Scene;
 use crate::scene::framing::{Bounds, robust_bounds_within};
@@ -34,51 +34,51 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
             return Exit::Failed;
         }
     };
-    pages::allow(for_large_pages(job));
+    huge_pages::allow(for_large_pages(job));
     let sources = Sources::of(job.batches.iter().flat_map(|b| &b.inputs));
-    let mut so_far = SoFar::new(sources);
+    let mut run_state = RunState::new(sources);
     // A picture that is repeated may be replaced by its repetition, but by nothing else.
     let spared = |path| Sources::of(&job.again).spared_by(path, "--stats-file");
     if let Some(path) = job.stats_file() {
         let growth = outputs::grows_with(&job.batches, path).filter(|growth| !growth.is_dir());
-        let checked = writable::check_in(path, "--stats-file", growth, &so_far.sources);
+        let checked = writable::check_in(path, "--stats-file", growth, &run_state.sources);
         if let Err(fault) = checked.and_then(|()| spared(path)) {
             return messages.fail(&fault, Exit::Failed);
         }
     }
-    let parallel_inputs::Ended { worst, failed } = parallel_inputs::run(job, &pool, messages, &mut so_far);
+    let parallel_inputs::Ended { worst, failed } = parallel_inputs::run(job, &pool, messages, &mut run_state);
     if interrupt::raised() {
         return Exit::Interrupted;
     }
     if job.batches.len() > 1 {
-        let (pictures, scenes) = (so_far.pictures.len() as u64, job.batches.len());
+        let (pictures, scenes) = (run_state.pictures.len() as u64, job.batches.len());
         let failed = if failed == 0 { String::new() } else { format!(", {failed} of them failed") };
         let pictures = so_many(pictures, "picture");
-        let fresh = if job.update { format!(", {} up to date", so_far.up_to_date) } else { String::new() };
+        let fresh = if job.update { format!(", {} up to date", run_state.up_to_date) } else { String::new() };
         let warnings = so_many(u64::from(messages.warnings()), "warning");
         messages.info("batch", format!("{pictures} of {scenes} inputs{fresh}{failed}, {warnings}"));
     }
     match &job.batches[..] {
-        [only] if so_far.up_to_date == 1 && only.shots.len() == 1 => {
+        [only] if run_state.up_to_date == 1 && only.shots.len() == 1 => {
             let picture = only.shots[0].target.path().unwrap_or(Path::new("-"));
             messages.say(Severity::Info, &Diagnostic::new("up-to-date", picture, "", "is up to date"));
         }
-        [_] if so_far.up_to_date > 0 => {
-            messages.info("up-to-date", format!("{} are up to date", so_many(so_far.up_to_date, "picture")));
+        [_] if run_state.up_to_date > 0 => {
+            messages.info("up-to-date", format!("{} are up to date", so_many(run_state.up_to_date, "picture")));
         }
         _ => {}
     }
-    worst.max(report(job, &so_far, messages))
+    worst.max(report(job, &run_state, messages))
 }
 
 /// What a run has read and made so far.
-pub(super) struct SoFar {
+pub(super) struct RunState {
     /// Whether a frame of the sequence that is rendered shows something.
     pub shown: bool,
     /// Folders that are not there, and that this was said of.
     pub missing: HashSet<PathBuf>,
     /// Files and views whose pictures show nothing, and that this was said of.
-    pub unseen: HashSet<(PathBuf, String)>,
+    pub warned_empty: HashSet<(PathBuf, String)>,
     /// All inputs, and the files that those loaded so far use.
     pub sources: Sources,
     /// How many pictures were left alone, as they are up to date.
@@ -89,13 +89,13 @@ pub(super) struct SoFar {
     pub foretold: Vec<String>,
 }
 
-impl SoFar {
+impl RunState {
     /// Nothing yet.
     fn new(sources: Sources) -> Self {
         Self {
             shown: false,
             missing: HashSet::new(),
-            unseen: HashSet::new(),
+            warned_empty: HashSet::new(),
             sources,
             up_to_date: 0,
             pictures: Vec::new(),
@@ -113,7 +113,7 @@ impl SoFar {
         self.up_to_date += one.up_to_date;
         self.pictures.extend(one.pictures);
         self.foretold.extend(one.foretold);
-        self.unseen.extend(one.unseen);
+        self.warned_empty.extend(one.warned_empty);
     }
 }
 
@@ -136,12 +136,12 @@ fn for_large_pages(job: &RenderJob) -> Duration {
 }
 
 /// Prints or writes the statistics, if there are any, but never over what a model was read from.
-fn report(job: &RenderJob, so_far: &SoFar, messages: &Messages) -> Exit {
-    let text = if job.dry_run { so_far.foretold.concat() } else { stats::text(job, &so_far.pictures) };
+fn report(job: &RenderJob, run_state: &RunState, messages: &Messages) -> Exit {
+    let text = if job.dry_run { run_state.foretold.concat() } else { stats::text(job, &run_state.pictures) };
     if text.is_empty() {
         return Exit::Done;
     }
-    match job.stats_file().map_or(Ok(()), |path| so_far.sources.spared_by(path, "--stats-file")) {
+    match job.stats_file().map_or(Ok(()), |path| run_state.sources.spared_by(path, "--stats-file")) {
         Ok(()) => stats::report(job, &text, messages),
         // It was said when that model was loaded.
         Err(_) => Exit::Failed,
@@ -153,7 +153,7 @@ pub(super) fn writable_shots<'a>(
     job: &RenderJob,
     batch: &'a Batch,
     messages: &Messages,
-    so_far: &mut SoFar,
+    run_state: &mut RunState,
 ) -> (Vec<&'a Shot>, Exit) {
     let mut worst = Exit::Done;
     let mut shots = Vec::new();
@@ -162,13 +162,13 @@ pub(super) fn writable_shots<'a>(
         let goes = |target: &Target| !job.dry_run || target.path().is_some();
         let mut targets = outputs::of(shot, job.beside()).into_iter().filter(goes);
         let growth = shot.growth.as_deref();
-        match targets.try_for_each(|target| writable::check_target(&target, growth, &so_far.sources)) {
+        match targets.try_for_each(|target| writable::check_target(&target, growth, &run_state.sources)) {
             Ok(()) => shots.push(shot),
             Err(fault) => {
                 // Of pictures for a folder that is not there, one says so.
                 let goal = destination(&fault.file);
                 let folder = goal.parent().filter(|_| fault.code == writable::NO_FOLDER);
-                if folder.is_none_or(|folder| so_far.missing.insert(folder.to_path_buf())) {
+                if folder.is_none_or(|folder| run_state.missing.insert(folder.to_path_buf())) {
                     messages.say(Severity::Error, &fault);
                 }
                 worst = Exit::Failed;
@@ -184,7 +184,7 @@ pub(super) fn render_batch(
     batch: &Batch,
     shots: &[&Shot],
     messages: &Messages,
-    so_far: &mut SoFar,
+    run_state: &mut RunState,
 ) -> Exit {
     let mut old = shots.to_vec();
     if job.update {
@@ -192,8 +192,8 @@ pub(super) fn render_batch(
             None => true,
             Some(files) => {
                 // Other pictures must not replace them, either.
-                so_far.sources.add(files);
-                so_far.up_to_date += 1;
+                run_state.sources.add(files);
+                run_state.up_to_date += 1;
                 false
             }
         });
@@ -205,18 +205,18 @@ pub(super) fn render_batch(
     let name = batch.inputs[0].file_name().unwrap_or(batch.inputs[0].as_os_str()).to_string_lossy();
     let progress = Progress::new(&name, messages, job.quiet || messages.are_kept(), job.keep_partial);
     let task = Task { job, batch, messages, progress: &progress };
-    render_shots(&task, &old, so_far).unwrap_or_else(|exit| exit)
+    render_shots(&task, &old, run_state).unwrap_or_else(|exit| exit)
 }
 
 /// The pictures of one scene; the error is how it ended when not all of them could be tried.
-fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit, Exit> {
+fn render_shots(task: &Task, shots: &[&Shot], run_state: &mut RunState) -> Result<Exit, Exit> {
     let Task { job, batch, messages, progress } = *task;
-    let mut profile = if so_far.pictures.is_empty() { Profile::of_process() } else { Profile::new() };
+    let mut profile = if run_state.pictures.is_empty() { Profile::of_process() } else { Profile::new() };
     let aspect = |scene: &Scene| Effective::new(&job.look, scene).map_or(1.0, |effective| effective.aspect());
     let survey = Survey::of(job, batch, aspect, messages, progress)?;
     survey.iter().for_each(|_| profile.done("frame"));
-    so_far.shown = false;
-    let up_to_date = so_far.up_to_date;
+    run_state.shown = false;
+    let up_to_date = run_state.up_to_date;
     let mut earlier = beginning(task, shots, survey.as_ref(), &mut profile)?;
     let (mut worst, mut left) = (Exit::Done, shots);
     while let Some(first) = left.first() {
@@ -226,18 +226,18 @@ fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit
         left = later;
         let mut ready =
             prepare(task, (&first.step, survey.as_ref()), earlier.take(), profile).map_err(|exit| worst.max(exit))?;
-        so_far.sources.add(&ready.loaded.facts.files);
+        run_state.sources.add(&ready.loaded.facts.files);
         if let Some(path) = job.stats_file() {
-            let spared = so_far.sources.spared_by(path, "--stats-file");
+            let spared = run_state.sources.spared_by(path, "--stats-file");
             spared.map_err(|fault| worst.max(task.fail(&fault, Exit::Failed)))?;
         }
         let mut stage = ready.stage(survey.as_ref());
         for shot in now {
             if job.update && up_to_date::is_as_loaded(job, batch, shot, stage.loaded) {
-                so_far.up_to_date += 1;
+                run_state.up_to_date += 1;
                 continue;
             }
-            worst = worst.max(shot::render(task, shot, &mut stage, so_far).unwrap_or_else(|exit| exit));
+            worst = worst.max(shot::render(task, shot, &mut stage, run_state).unwrap_or_else(|exit| exit));
             if interrupt::raised() {
                 return Err(Exit::Interrupted);
             }
@@ -245,8 +245,8 @@ fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit
         drop(stage);
         (earlier, profile) = (Some(ready), Profile::new());
     }
-    let all = shots.len() == batch.shots.len() && so_far.up_to_date == up_to_date;
-    if survey.is_some() && all && !so_far.shown && !job.dry_run && worst == Exit::Done {
+    let all = shots.len() == batch.shots.len() && run_state.up_to_date == up_to_date;
+    if survey.is_some() && all && !run_state.shown && !job.dry_run && worst == Exit::Done {
         messages.say(Severity::Warning, &empty_picture::sequence(shots.len(), task.file()));
         if job.strict {
             let text = "--strict, and there is a warning; the pictures were written before it was known";

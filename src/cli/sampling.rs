@@ -198,8 +198,8 @@ impl SamplingArgs {
         })
     }
 
-    /// The samples of uniform sampling, and which rays pixels get. Errors are counted in what is said here; [`Self::written`] says
-    /// what that is for one picture.
+    /// The samples of uniform sampling, and which rays pixels get. Errors are counted in what is said here;
+    /// [`Self::written`] says what that is for one picture.
     pub(super) fn sampling(&self, hints: &RenderHints) -> (u32, Sampling) {
         let usual = Settings::default().samples;
         let samples = self.samples.or(hints.samples).unwrap_or(usual);

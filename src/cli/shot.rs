@@ -8,7 +8,7 @@ use super::outputs;
 use super::picture::{self, Behind, Effective};
 use super::profile::Profile;
 use super::progress::Progress;
-use super::render::SoFar;
+use super::render::RunState;
 use super::sequence::{self, Survey};
 use super::stats::{self, Counted, PictureStats, Times};
 use super::summary::Summary;
@@ -122,11 +122,11 @@ fn behind(job: &RenderJob) -> Behind {
 }
 
 /// Whether a picture fits into the memory that is allowed, into a file of its type, and may still be written where it goes.
-fn check(task: &Task, shot: &Shot, effective: &Effective, so_far: &SoFar) -> Result<(), Exit> {
+fn check(task: &Task, shot: &Shot, effective: &Effective, run_state: &RunState) -> Result<(), Exit> {
     let Task { job, .. } = *task;
     let mut targets = outputs::of(shot, job.beside()).into_iter();
     targets
-        .try_for_each(|target| so_far.sources.spared_by_target(&target))
+        .try_for_each(|target| run_state.sources.spared_by_target(&target))
         .map_err(|fault| task.fail(&fault, Exit::Failed))?;
     if let Some(fault) = picture::too_large(effective, shot.kind, behind(job), job.load.limits.memory) {
         return Err(task.fail(&fault, Exit::Failed));
@@ -138,10 +138,10 @@ fn check(task: &Task, shot: &Shot, effective: &Effective, so_far: &SoFar) -> Res
 }
 
 /// Renders a picture and writes it, or foretells it. The error is how that ended, too, and was said.
-pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut SoFar) -> Result<Exit, Exit> {
+pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, run_state: &mut RunState) -> Result<Exit, Exit> {
     let Task { job, progress, .. } = *task;
     let mut effective = effective(task, &stage.loaded.scene)?;
-    check(task, shot, &effective, so_far)?;
+    check(task, shot, &effective, run_state)?;
 
     // The eye, then the light that belongs to it: each view has its own.
     let (camera, phrase) = stage.camera(task, shot, &effective)?;
@@ -182,10 +182,10 @@ pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut S
         let work = Job { settings: &effective.settings, scene, world, accel, textures: &textures, view: &view };
         let (effective, reason, phrase) = (&effective, *reason, phrase.as_str());
         let prepared = Prepared { task, shot, effective, loaded, bounds, work, reason, phrase, light, is_frame };
-        if prepared.warn(so_far) && job.strict {
+        if prepared.warn(run_state) && job.strict {
             return prepared.refuse_warned();
         }
-        if job.dry_run { prepared.foretell(so_far) } else { prepared.draw(times, profile, so_far) }
+        if job.dry_run { prepared.foretell(run_state) } else { prepared.draw(times, profile, run_state) }
     }))
 }
 
@@ -208,7 +208,7 @@ struct Prepared<'a> {
 
 impl Prepared<'_> {
     /// Says what the picture would take, or keeps it for the file of the statistics.
-    fn foretell(&self, so_far: &mut SoFar) -> Exit {
+    fn foretell(&self, run_state: &mut RunState) -> Exit {
         let Task { job, messages, progress, .. } = *self.task;
         progress.begin("looking");
         let found = crate::render::forecast(&self.work, progress);
@@ -220,14 +220,14 @@ impl Prepared<'_> {
         let which = dry_run::Which { file: self.task.file(), view: self.phrase, target: &self.shot.target };
         let told = dry_run::told(which, &self.work, &forecast, picture, format);
         if job.stats_file().is_some() {
-            so_far.foretold.push(told);
+            run_state.foretold.push(told);
             return Exit::Done;
         }
         messages.print(&told).err().unwrap_or_default()
     }
 
     /// Renders the picture and writes it, and says and keeps what there is to say of it.
-    fn draw(&self, mut times: Times, profile: &mut Profile, so_far: &mut SoFar) -> Exit {
+    fn draw(&self, mut times: Times, profile: &mut Profile, run_state: &mut RunState) -> Exit {
         let Task { job, messages, progress, batch } = *self.task;
         let Self { shot, effective, loaded, work, .. } = self;
         profile.skip();
@@ -268,7 +268,7 @@ impl Prepared<'_> {
         clipped.iter().for_each(|warning| messages.say(Severity::Warning, warning));
         let profile = job.profile.then(|| profile.take());
         profile.iter().for_each(|p| p.say(messages));
-        so_far.pictures.push(self.stats(&making, times, counted, profile.as_ref()));
+        run_state.pictures.push(self.stats(&making, times, counted, profile.as_ref()));
         match cost_layers::write_maps(job, shot, &effective.settings, &costs, accel, messages) {
             Ok(()) => self.judge(counted.as_ref()),
             Err(fault) => self.task.fail(&fault, Exit::Failed),
@@ -276,27 +276,27 @@ impl Prepared<'_> {
     }
 
     /// Warns of a picture that shows nothing, or not what was asked for; whether it did.
-    fn warn(&self, so_far: &mut SoFar) -> bool {
+    fn warn(&self, run_state: &mut RunState) -> bool {
         let Task { job, messages, .. } = *self.task;
         let Self { shot, work, .. } = self;
-        so_far.shown = so_far.shown || self.is_frame && empty_picture::shows_something(work);
-        let unseen = match self.is_frame {
+        run_state.shown = run_state.shown || self.is_frame && empty_picture::shows_something(work);
+        let warned_empty = match self.is_frame {
             true => None,
             false => empty_picture::warning(work, (&shot.choice, self.phrase), job.look.lens, self.task.file()),
         };
         // All around a model it is the same.
-        if let Some(warning) = &unseen
-            && so_far.unseen.insert((self.task.file().to_owned(), shot.choice.name()))
+        if let Some(warning) = &warned_empty
+            && run_state.warned_empty.insert((self.task.file().to_owned(), shot.choice.name()))
         {
             messages.say(Severity::Warning, warning);
         }
         let is_lost = shot.kind == FileKind::Jpeg && work.scene.background == Some(Background::Transparent);
-        if is_lost && !(job.strict && unseen.is_some()) {
+        if is_lost && !(job.strict && warned_empty.is_some()) {
             let text = "JPEG has no transparency: what is transparent is white";
             let warning = Diagnostic::new("jpeg-opaque", shot.target.path().unwrap_or(Path::new("-")), "", text);
             messages.say(Severity::Warning, &warning.remedy("write PNG or WebP"));
         }
-        is_lost || unseen.is_some()
+        is_lost || warned_empty.is_some()
     }
 
     /// Says that there is no picture, as warnings are errors and there was one.

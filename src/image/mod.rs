@@ -11,13 +11,13 @@ mod error;
 mod exif;
 mod exr;
 mod kind;
-pub mod look;
 pub mod metadata;
 mod output;
 mod photo;
 mod png;
 pub mod read;
 pub mod srgb;
+pub mod statistics;
 pub mod tone;
 mod write;
 

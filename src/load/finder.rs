@@ -20,7 +20,7 @@ const MISSES: usize = 256;
 
 /// Where a file is.
 #[derive(Debug)]
-pub(super) struct Place {
+pub(super) struct FoundPath {
     /// Path relative to the model's folder, or absolute.
     pub path: PathBuf,
     /// One path for all names of a file.
@@ -32,21 +32,21 @@ pub(super) struct Place {
 impl Finder<'_> {
     /// Finds and reads `name`.
     pub(super) fn read(&mut self, name: &str, folders: &[&Path]) -> Result<Found, FileFault> {
-        let Place { path, guessed, .. } = self.find(name, folders)?;
+        let FoundPath { path, guessed, .. } = self.find(name, folders)?;
         Ok(Found { bytes: self.resolver.read_file(&path)?, path, guessed })
     }
 
     /// Finds `name`, looking in `folders` (relative to the model's), first as written, then in any case, then without its
     /// first folders, as written and in any case, then in folders that pictures are in, at last as a picture of another kind.
     /// The fault is that of the name as written.
-    pub(super) fn find(&mut self, name: &str, folders: &[&Path]) -> Result<Place, FileFault> {
+    pub(super) fn find(&mut self, name: &str, folders: &[&Path]) -> Result<FoundPath, FileFault> {
         let slashed = name.replace('\\', "/");
         let mut fault = None;
         for folder in folders {
             for name in [name, &slashed] {
                 let path = folder.join(name);
                 match self.resolver.locate(&path) {
-                    Ok(canonical) => return Ok(Place { path, canonical, guessed: false }),
+                    Ok(canonical) => return Ok(FoundPath { path, canonical, guessed: false }),
                     Err(e) => fault = fault.or(Some(e)),
                 }
             }
@@ -58,7 +58,7 @@ impl Finder<'_> {
         })
     }
 
-    fn elsewhere(&mut self, name: &str, folders: &[&Path]) -> Option<Place> {
+    fn elsewhere(&mut self, name: &str, folders: &[&Path]) -> Option<FoundPath> {
         if *self.missed >= MISSES {
             return None;
         }
@@ -67,7 +67,7 @@ impl Finder<'_> {
         place
     }
 
-    fn guess(&mut self, name: &str, folders: &[&Path]) -> Option<Place> {
+    fn guess(&mut self, name: &str, folders: &[&Path]) -> Option<FoundPath> {
         let last = Path::new(name).file_name()?;
         let shortened = without_first_folders(name);
         let resolver = &mut *self.resolver;
@@ -80,7 +80,7 @@ impl Finder<'_> {
             names.flat_map(|name| in_folders(&name)).find_map(|path| resolver.in_any_case(&path))
         })?;
         let canonical = self.resolver.locate(&path).ok()?;
-        Some(Place { path, canonical, guessed: true })
+        Some(FoundPath { path, canonical, guessed: true })
     }
 
     /// Reads the libraries of one `mtllib` statement: one name with spaces, or several names.

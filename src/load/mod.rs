@@ -21,7 +21,7 @@ pub mod paths;
 mod place;
 pub mod ply;
 pub mod scene_file;
-mod smooth;
+mod smooth_normals;
 pub mod stl;
 pub mod suggest;
 pub mod tangents;
@@ -147,8 +147,8 @@ pub struct Facts {
     pub shown: Option<(usize, f64)>,
     /// Whether that changes materials, or which nodes are visible: other moments may show pictures that this one does not.
     pub changes_materials: bool,
-    /// glTF extensions used: (name, required by the file, supported by us).
-    pub extensions: Vec<(String, bool, bool)>,
+    /// glTF extensions that the file names, each once.
+    pub extensions: Vec<ExtensionFacts>,
     /// Names of the scenes in the file; the loaded one is `scene_index`.
     pub scenes: Vec<String>,
     /// Which scene was loaded.
@@ -197,6 +197,17 @@ pub struct AnimationFacts {
     pub seconds: f64,
     /// How many properties of nodes it changes.
     pub channels: usize,
+}
+
+/// An extension of glTF that a file names.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ExtensionFacts {
+    /// Its name, such as `KHR_materials_volume`.
+    pub name: String,
+    /// Whether the file says that it cannot be shown without.
+    pub required: bool,
+    /// Whether it is drawn as it says.
+    pub supported: bool,
 }
 
 /// A file in memory, with the name it was read from.
@@ -332,7 +343,8 @@ fn load_within(source: &Source, options: &LoadOptions, budget: &mut Budget) -> R
     }?;
     loaded.warnings.extend(source.note.clone());
     if let Some(angle) = options.smooth {
-        smooth::smooth(&mut loaded.scene, angle, budget).map_err(|over| too_large("smooth normals are", over))?;
+        smooth_normals::smooth(&mut loaded.scene, angle, budget)
+            .map_err(|over| too_large("smooth normals are", over))?;
         tangents::generate_left(&mut loaded.scene);
     }
     // Others have no transforms.

@@ -7,8 +7,8 @@
 use super::diagnostic::{CUT_OFF, RAISE_MEMORY};
 use super::limits::{Budget, Limits};
 use super::{Diagnostic, Warnings, ktx};
+use crate::huge_pages::Paged;
 use crate::jpeg;
-use crate::pages::Paged;
 use crate::scene::{Bitmap, Pixels};
 use crate::stopwatch::{Spent, Stopwatch};
 use ::image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};

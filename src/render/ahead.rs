@@ -74,7 +74,7 @@ mod tests {
     use crate::render::fireflies::{self, Closely};
     use crate::render::sampling::{Sampling, Stochastic};
     use crate::render::texture::TextureStore;
-    use crate::render::tile::render_tiles;
+    use crate::render::tile::{RenderedTiles, render_tiles};
     use crate::render::view::{Lens, View};
     use crate::render::{Job, World};
     use crate::scene::{Environment, Material, MetalRough, Reflection, Scene, Sphere};
@@ -123,7 +123,7 @@ mod tests {
                 counts.iter().map(|counts| counts.primary.queries).sum()
             };
             let render = |context: &Context| {
-                let (picture, sampled, counts, _) =
+                let RenderedTiles { picture, sampled, counts, .. } =
                     render_tiles::<_, RayCounts>(context, &accel, &view, &settings, &());
                 (picture, sampled, primary(&counts))
             };

@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::draws::{Purpose, SampleSet};
 use super::glint::{self, MIRROR};
-use super::hotspot::HotspotSampled;
+use super::hotspot_rays::HotspotSampled;
 use super::media::{Crossing, MediaTable, Medium};
 use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};

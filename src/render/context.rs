@@ -1,13 +1,13 @@
 //! What every ray of an image shares: the scene, its lights and sky in the centred frame, and the limits of the trees.
 
 use super::Settings;
-use super::absorption::Absorption;
 use super::ahead::Ahead;
 use super::alpha_voids::{AlphaFilter, AlphaVoids, Cones};
 use super::certainty;
 use super::fireflies::Fireflies;
 use super::frame::sample_width;
 use super::glint;
+use super::media::absorption::Absorption;
 use super::observer::Observer;
 use super::sampling::Sampling;
 use super::shade::{Band, LocalLight, bands};
@@ -56,7 +56,7 @@ pub(crate) struct Context<'a> {
     pub lights: Vec<LocalLight>,
     /// What is known of each material for all points of it; `None` where it takes more, or where each point must be
     /// looked at.
-    pub common: Arc<[Option<MaterialConstants>]>,
+    pub material_constants: Arc<[Option<MaterialConstants>]>,
     /// Parts of the spectrum; empty unless a material disperses light.
     pub bands: Vec<Band>,
     /// Where rays find nothing for certain.
@@ -151,16 +151,16 @@ impl<'a> Context<'a> {
             sky.find_hotspot();
         }
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
-        let ways = environment_ways(
+        let samplers = environment_samplers(
             sky.is_map(),
             features.has(Feature::DiffuseTransmission),
             features.has(Feature::MetalRough),
         );
-        let env_rays = shared_env_rays(env_rays, together, ways);
+        let env_rays = shared_env_rays(env_rays, together, samplers);
         let lights: Vec<LocalLight> = scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect();
         let light_rays = settings.light_rays.max(1).div_ceil(together);
         let alone = no_prune || settings.one_by_one;
-        let common =
+        let constants =
             |m: (u32, &Material)| if alone { None } else { MaterialConstants::of(m, textures, depth > 0, gloss) };
         let needs = |any: &[Feature]| no_prune || any.iter().any(|&f| features.has(f));
         Self {
@@ -180,7 +180,7 @@ impl<'a> Context<'a> {
             seed: settings.seed,
             points_at_a_time: points_at_a_time(&lights, light_rays, env_rays, gloss),
             lights,
-            common: (0..).zip(&scene.materials).map(common).collect(),
+            material_constants: (0..).zip(&scene.materials).map(constants).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
             alpha_voids: (!no_prune).then(|| AlphaVoids::of(scene, world, textures)).flatten().map(Arc::new),
             has_filters: no_prune || !world.is_opaque(),
@@ -198,7 +198,7 @@ impl<'a> Context<'a> {
     ///
     /// What a sample gathers is added in the order of its rays, which must not depend on where these pass gaps, and so on how
     /// many wait: so they do where each of so many samples has one ray alone, or no more wait in the end than go together.
-    pub(super) fn before<'r, P: Observer>(
+    pub(super) fn alpha_filter<'r, P: Observer>(
         &'r self,
         (class, samples): (RayClass, usize),
         rays: &'r [Ray],
@@ -207,7 +207,7 @@ impl<'a> Context<'a> {
         let each = 2 * self.gloss.rays as usize + self.bands.len() + 2;
         let in_order = self.depth == 0 || class == RayClass::Primary && samples.saturating_mul(each) < FOLLOWERS;
         let alpha_voids = self.alpha_voids.as_ref().filter(|_| P::FILTERS_ALPHA && in_order)?;
-        Some(alpha_voids.before(rays, cones))
+        Some(alpha_voids.filter(rays, cones))
     }
 
     /// Whether shadow rays ask on their way what lets light through, and how much.
@@ -238,7 +238,7 @@ impl<'a> Context<'a> {
     }
 
     /// Whether no formula tells what many points see of their surroundings.
-    pub(crate) fn looks_around_by_points(&self) -> bool {
+    pub(crate) fn environment_needs_points(&self) -> bool {
         self.sky.is_map() || self.env_rays > 0
     }
 
@@ -259,15 +259,15 @@ impl<'a> Context<'a> {
 
 /// Ways in which directions to the surroundings are drawn, which are a panorama or not, from surfaces of which some are
 /// translucent or not, and rough mirrors or not.
-fn environment_ways(to_panorama: bool, translucent: bool, glossy: bool) -> u32 {
+fn environment_samplers(to_panorama: bool, translucent: bool, glossy: bool) -> u32 {
     // To each side. What a lobe gathers is met in it alone, and so is the sun of a panorama by its own light.
     1 + u32::from(translucent) + if to_panorama { 2 } else { u32::from(glossy) }
 }
 
 /// Rays from each of so many samples to its surroundings, where each would send `rays` alone: at least one for each way in
 /// each of both halves, for one that is met by chance through another brings seldom and far too much.
-fn shared_env_rays(rays: u32, together: u32, ways: u32) -> u32 {
-    if rays == 0 { 0 } else { rays.div_ceil(together).max(2 * ways) }
+fn shared_env_rays(rays: u32, together: u32, samplers: u32) -> u32 {
+    if rays == 0 { 0 } else { rays.div_ceil(together).max(2 * samplers) }
 }
 
 /// As many points as send hardly more rays together than may wait.
@@ -342,7 +342,7 @@ mod tests {
                 (false, true, false),
                 (true, true, true),
             ]
-            .map(|(map, thin, glossy)| shared_env_rays(rays, together, environment_ways(map, thin, glossy)))
+            .map(|(map, thin, glossy)| shared_env_rays(rays, together, environment_samplers(map, thin, glossy)))
         };
         assert_eq!(shared(0, 4), [0; 5]);
         assert_eq!(shared(1, 1), [2, 4, 6, 4, 8]);

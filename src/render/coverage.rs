@@ -1,7 +1,7 @@
 //! How much of a picture shows something, as rays spread over it tell.
 
 use super::media::Media;
-use super::primary_rays::{Ball, Eye, Place};
+use super::primary_rays::{Ball, CameraSample, Eye};
 use super::shade::Reader;
 use super::surface::{HitPrim, Surface};
 use super::{Job, sobol};
@@ -67,7 +67,7 @@ fn sent(job: &Job, numbers: Range<u32>) -> Coverage {
     };
     let place = |i: u32| {
         let [x, y] = sobol::point(i, 0);
-        Place::new(x * f64::from(width), y * f64::from(height))
+        CameraSample::new(x * f64::from(width), y * f64::from(height))
     };
     let rays: Vec<Ray> = numbers.clone().map(|i| eye.ray_with_path(place(i), Media::OUTSIDE).0).collect();
     let mut hits = vec![Hit::MISS; rays.len()];

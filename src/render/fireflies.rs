@@ -11,13 +11,13 @@ use super::ahead::Ahead;
 use super::by_class::ByClass;
 use super::certainty::{Certainty, output};
 use super::context::Context;
+use super::forecast::part::Quiet;
 use super::frame::{Frame, pixel_key};
 use super::observer::Observer;
-use super::part::Quiet;
 use super::roulette::Roulette;
 use super::sampling::{Sampling, Stochastic};
 use super::stochastic::{Places, Wanted};
-use super::tile::{TILE, TOGETHER, Tile, each_tile, tiles};
+use super::tile::{TILE, TOGETHER, Tile, TracedTiles, each_tile, tiles};
 use super::whitted::{Sample, Tracer};
 use super::{Job, Progress, Settings};
 use crate::accel::Accel;
@@ -191,8 +191,9 @@ pub(super) fn look<P: Observer>(
         asked.iter_mut().zip(&answers).for_each(|(grid, answers)| grid.put(answers, step));
         Some(answers.iter().map(Vec::len).sum::<usize>() as u64)
     };
-    let (each, mut counts, complete) = each_tile(context, accel, &tiles(width, height), &Quiet(progress), work);
-    let all = each.into_iter().sum();
+    let TracedTiles { finished, mut counts, complete } =
+        each_tile(context, accel, &tiles(width, height), &Quiet(progress), work);
+    let all = finished.into_iter().sum();
     let mut rays = Rays { all, beside: all };
     // After cancelling the picture is not wanted, either.
     if !complete {
@@ -204,7 +205,8 @@ pub(super) fn look<P: Observer>(
     let pixels: Vec<&[Bright]> = bright.chunk_by(|one, next| one.pixel == next.pixel).collect();
     let some: Vec<&[&[Bright]]> = pixels.chunks(TOGETHER / AGAIN as usize).collect();
     let work = |tracer: &mut Tracer<_, P>, some: &&[&[Bright]]| question.ask_again(tracer, &asked, some);
-    let (answers, more, complete) = each_tile(context, accel, &some, &Quiet(progress), work);
+    let TracedTiles { finished: answers, counts: more, complete } =
+        each_tile(context, accel, &some, &Quiet(progress), work);
     counts.extend(more);
     if complete {
         let again = pixels.len() as u64 * u64::from(AGAIN);

@@ -3,10 +3,10 @@
 use super::Settings;
 use super::certainty;
 use super::context::Context;
-use super::immersion::media_around;
 use super::media::Medium;
-use super::pixel::sample_offsets;
-use super::primary_rays::{Ball, Eye, Place, ThinLens};
+use super::media::around_eye::media_around;
+use super::primary_rays::{Ball, CameraSample, Eye, ThinLens};
+use super::sample_offsets::sample_offsets;
 use super::sampling::Sampling;
 use super::sobol::{self, mix};
 use super::view::View;
@@ -71,11 +71,11 @@ impl<'a> Frame<'a> {
     }
 
     /// The places of the samples of a pixel when they are the same in each, but for the lens.
-    pub(super) fn places(&self, (x, y): (u32, u32)) -> impl Iterator<Item = Place> {
+    pub(super) fn places(&self, (x, y): (u32, u32)) -> impl Iterator<Item = CameraSample> {
         let (lens, key) = (self.settings.lens, pixel_key(self.settings.seed, (x, y)));
         (0..).zip(&self.offsets).map(move |(i, &(dx, dy))| {
-            let place = Place::new(f64::from(x) + dx, f64::from(y) + dy);
-            Place { lens: on_lens(lens, key, i), ..place }
+            let place = CameraSample::new(f64::from(x) + dx, f64::from(y) + dy);
+            CameraSample { lens: on_lens(lens, key, i), ..place }
         })
     }
 }

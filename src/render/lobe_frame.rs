@@ -15,6 +15,8 @@ pub(crate) struct LobeFrame<'a> {
     pub smooth: Vec3,
     /// 1 where a mesh's own normal is on that side, else −1.
     pub side: f32,
+    /// Normal of the face, on the side that is seen.
+    pub geometric: Vec3,
     /// Normal for shading.
     pub normal: Vec3,
     /// Back along the ray.
@@ -27,7 +29,7 @@ impl LobeFrame<'_> {
         // Maps turn the mesh's own normal: tangents belong to that side.
         let turned = |patch: &Patch| patch.normal_mapped(self.smooth * self.side, map?, scale, store);
         let turned = self.patch.and_then(turned).map(|normal| normal * self.side);
-        facing(turned.unwrap_or(self.smooth), self.view)
+        facing(turned.unwrap_or(self.smooth), self.geometric, self.view)
     }
 
     /// Vectors on the surface for coordinates of a map: along and across; any two where nothing tells.

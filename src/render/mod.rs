@@ -9,26 +9,22 @@
 //! The pixels are the same bits for every structure and every number of threads: structures give equal hits, sums run
 //! in a fixed order within a tile, and transcendental functions are the crate's own.
 
-mod absorption;
 mod adaptive;
 mod ahead;
 mod alpha_voids;
-mod asking;
 mod branch;
 mod by_class;
 mod certainty;
 mod context;
 mod costs;
 mod coverage;
-mod curve;
 mod draws;
-mod filters;
+mod environment_rays;
 mod fireflies;
 mod forecast;
 mod frame;
 mod glint;
-mod hotspot;
-mod immersion;
+mod hotspot_rays;
 mod instancing;
 mod layers;
 mod lobe_frame;
@@ -36,12 +32,13 @@ mod media;
 pub mod no_prune;
 pub(crate) mod observer;
 pub mod optics;
-mod part;
 mod patch;
-mod pixel;
 mod primary_rays;
 mod profile;
+mod ray_caster;
+pub mod ray_tree;
 mod roulette;
+mod sample_offsets;
 mod sampling;
 mod seam;
 mod shade;
@@ -51,11 +48,9 @@ mod shadow;
 mod sky;
 mod sobol;
 mod stochastic;
-pub mod story;
 pub mod studio;
 mod surface;
 mod tail;
-mod target;
 #[cfg(test)]
 mod tests;
 pub mod texture;
@@ -70,13 +65,13 @@ pub(crate) use adaptive::pixels_at_a_time as adaptive_pixels_at_a_time;
 pub use by_class::ByClass;
 pub use costs::{Cost, Costs, render_costs};
 pub use coverage::{Coverage, coverage};
-pub use filters::{Filters, Noted};
 pub use forecast::{Forecast, Interval, forecast};
 pub use instancing::Instancing;
 pub use observer::{Asked, Question, Tape};
 pub use primary_rays::ThinLens;
 pub use profile::{Profile, render_profiled};
 pub use sampling::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Split, Stochastic, Targeted};
+pub use shadow::filters::{FilterScratch, Filters};
 pub use surface::given_normal;
 pub use texture::TextureStore;
 pub use view::{Lens, View};
@@ -305,11 +300,11 @@ fn render_with<P: Observer>(
     prepared();
     let (rays, more) = fireflies::look(job, &mut context, Closely::All, progress);
     let (mut rendered, mut counts) = match &settings.sampling {
-        Sampling::Stochastic(how) if how.target.is_some() => target::render(job, &context, how, progress),
+        Sampling::Stochastic(how) if how.target.is_some() => forecast::target::render(job, &context, how, progress),
         _ => None,
     }
     .unwrap_or_else(|| {
-        let (picture, sampled, counts, complete) =
+        let tile::RenderedTiles { picture, sampled, counts, complete } =
             tile::render_tiles(&context, job.accel, job.view, settings, progress);
         (Rendered { picture, counts: ClassCounts::default(), sampled, depth: context.depth, complete }, counts)
     });

@@ -1,6 +1,6 @@
 //! The part of a mesh around a hit: interpolated attributes, texture coordinates, and how maps turn the normal.
 
-use super::curve::Curve;
+use super::shadow::curve::Curve;
 use super::texture::{ColorSpace, TextureStore};
 use super::world::Placement;
 use crate::math::{DVec3, Vec2, Vec3, Vec4};

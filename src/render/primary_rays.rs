@@ -54,14 +54,14 @@ pub struct ThinLens {
 
 /// A point of the picture, from its upper left corner in pixels, seen through a point of the lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Place {
+pub(crate) struct CameraSample {
     pub x: f64,
     pub y: f64,
     /// In the unit square, which is laid over the disc of the lens.
     pub lens: [f64; 2],
 }
 
-impl Place {
+impl CameraSample {
     /// Through the middle of the lens.
     pub(crate) fn new(x: f64, y: f64) -> Self {
         Self { x, y, lens: [0.5; 2] }
@@ -95,7 +95,7 @@ pub(crate) struct Ball {
 }
 
 /// An eye ray in the centred frame.
-struct EyeRay {
+struct CenteredRay {
     origin: Vec3,
     dir: Vec3,
     /// Width of a sample at the origin, and its growth.
@@ -105,13 +105,13 @@ struct EyeRay {
 
 impl Eye<'_> {
     /// The ray of a place, and what it carries inside of `media`, as sample 0.
-    pub(crate) fn ray_with_path(&self, place: Place, media: Media) -> (Ray, Path) {
-        let EyeRay { origin, dir, cone_width, cone_spread } = self.ray(place);
+    pub(crate) fn ray_with_path(&self, place: CameraSample, media: Media) -> (Ray, Path) {
+        let CenteredRay { origin, dir, cone_width, cone_spread } = self.ray(place);
         (ray(origin, dir, 0), Path::from_eye(cone_width, cone_spread, media))
     }
 
     /// The ray of a place, started before the scene when the eye is far away, in the centred frame.
-    fn ray(&self, place: Place) -> EyeRay {
+    fn ray(&self, place: CameraSample) -> CenteredRay {
         let eye = self.view.primary(place.x, place.y, self.width, self.height);
         self.start(match self.lens {
             Some(lens) => self.through(lens, eye, on_disc(place.lens)),
@@ -136,15 +136,15 @@ impl Eye<'_> {
     }
 
     #[inline(always)]
-    fn start(&self, eye: PrimaryRay) -> EyeRay {
+    fn start(&self, eye: PrimaryRay) -> CenteredRay {
         self.skip(eye, self.scene.seen_from(eye.origin).distance_before(eye.dir))
     }
 
     /// Starts a ray so far along.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "widths are estimates")]
-    fn skip(&self, eye: PrimaryRay, distance: f64) -> EyeRay {
-        EyeRay {
+    fn skip(&self, eye: PrimaryRay, distance: f64) -> CenteredRay {
+        CenteredRay {
             origin: (eye.origin - self.center + eye.dir * distance).as_vec3(),
             dir: eye.dir.as_vec3(),
             cone_width: (eye.cone_width + eye.cone_spread * distance as f32) * self.sample_width,
@@ -220,9 +220,9 @@ impl PrimaryRays {
     }
 
     /// Adds the rays of these places; the `i`th ray is that of sample `i`.
-    pub(crate) fn send(&mut self, eye: &Eye, places: impl Iterator<Item = Place>) {
+    pub(crate) fn send(&mut self, eye: &Eye, places: impl Iterator<Item = CameraSample>) {
         let mut run = Run::default();
-        places.for_each(|Place { x, y, lens }| {
+        places.for_each(|CameraSample { x, y, lens }| {
             let at = run.count % RUN;
             (run.x[at], run.y[at]) = (x, y);
             if eye.lens.is_some() {
@@ -401,10 +401,10 @@ impl Kernel for Aim<'_> {
 impl Run {
     /// Finds every ray from that through the middle of the lens, and the point of the lens.
     #[inline(always)]
-    fn each(&mut self, eye: &Eye, start: impl Fn(PrimaryRay, [f64; 2]) -> EyeRay) {
+    fn each(&mut self, eye: &Eye, start: impl Fn(PrimaryRay, [f64; 2]) -> CenteredRay) {
         for i in 0..self.count.next_multiple_of(LANES).min(RUN) {
             let ray = eye.view.primary(self.x[i], self.y[i], eye.width, eye.height);
-            let EyeRay { origin, dir, cone_width, cone_spread } = start(ray, self.lens[i]);
+            let CenteredRay { origin, dir, cone_width, cone_spread } = start(ray, self.lens[i]);
             (self.origin[0][i], self.origin[1][i], self.origin[2][i]) = (origin.x, origin.y, origin.z);
             (self.dir[0][i], self.dir[1][i], self.dir[2][i]) = (dir.x, dir.y, dir.z);
             (self.cone_width[i], self.cone_spread[i]) = (cone_width, cone_spread);
@@ -449,12 +449,12 @@ mod tests {
         for lens in [Lens::perspective(0.8), Lens::orthographic(3.0)] {
             let view = View::look_at(DVec3::new(1.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, lens);
             let thin = ThinLens { radius: 0.3, focus: 4.0 };
-            let sharp = eye(&view, None).ray(Place::new(7.5, 21.0));
+            let sharp = eye(&view, None).ray(CameraSample::new(7.5, 21.0));
             let length = 4.0 / f64::from(sharp.dir.dot(view.forward.as_vec3()));
             let meeting = sharp.origin + sharp.dir * length as f32;
             let mut farthest = 0.0_f32;
             for at in [[0.0, 0.0], [0.5, 0.5], [1.0, 0.3], [0.2, 0.9]] {
-                let ray = eye(&view, Some(thin)).ray(Place { x: 7.5, y: 21.0, lens: at });
+                let ray = eye(&view, Some(thin)).ray(CameraSample { x: 7.5, y: 21.0, lens: at });
                 let nearest = (meeting - ray.origin).dot(ray.dir);
                 assert!((ray.origin + ray.dir * nearest - meeting).length() < 1e-5, "{at:?}");
                 farthest = farthest.max((ray.origin - sharp.origin).length());
@@ -479,7 +479,8 @@ mod tests {
         let pixels: Vec<(u32, u32)> = (0..37).map(|i| (i, i * 3 % 29)).collect();
         for samples in [1, 3, 16, 100] {
             let offsets: Vec<(f64, f64)> = (0..samples).map(|i| (0.3 / f64::from(1 + i), 0.7)).collect();
-            let at = |&(x, y): &(u32, u32), &(dx, dy): &(f64, f64)| Place::new(f64::from(x) + dx, f64::from(y) + dy);
+            let at =
+                |&(x, y): &(u32, u32), &(dx, dy): &(f64, f64)| CameraSample::new(f64::from(x) + dx, f64::from(y) + dy);
             let places = pixels.iter().flat_map(|pixel| offsets.iter().map(move |offset| at(pixel, offset)));
             let (mut each, mut one_by_one) = (PrimaryRays::default(), PrimaryRays::default());
             each.send_each(&eye, &pixels, &offsets);
@@ -496,18 +497,18 @@ mod tests {
             let eye = eye(&view, lens);
             let place = |i: u32| {
                 let i = f64::from(i);
-                Place { x: i * 0.37, y: 30.0 - i * 0.21, lens: [(i * 0.618).fract(), (i * 0.414).fract()] }
+                CameraSample { x: i * 0.37, y: 30.0 - i * 0.21, lens: [(i * 0.618).fract(), (i * 0.414).fract()] }
             };
-            let mut eyes = PrimaryRays::default();
-            eyes.send(&eye, (0..100).map(place));
-            assert_eq!(eyes.rays().len(), 100);
+            let mut primary_rays = PrimaryRays::default();
+            primary_rays.send(&eye, (0..100).map(place));
+            assert_eq!(primary_rays.rays().len(), 100);
             if lens.is_none() {
                 let (mut by_columns, places) = (PrimaryRays::default(), (0..100).map(place));
                 let (x, y): (Vec<f64>, Vec<f64>) = places.map(|place| (place.x, place.y)).unzip();
                 by_columns.send_columns(&eye, &x, &y);
-                assert_eq!(by_columns.rays(), eyes.rays());
+                assert_eq!(by_columns.rays(), primary_rays.rays());
             }
-            for (i, ray) in (0..100).zip(eyes.rays()) {
+            for (i, ray) in (0..100).zip(primary_rays.rays()) {
                 assert_eq!(*ray, Ray { sample: i, ..eye.ray_with_path(place(i), Media::OUTSIDE).0 }, "{lens:?}");
             }
         }

@@ -6,14 +6,16 @@
 
 use super::branch::PathVertex;
 use super::context::Context;
-use super::curve::ShadowRays;
 use super::draws::{Draws, Purpose};
 use super::media::Media;
 use super::observer::Observer;
 use super::primary_rays::PrimaryRays;
 use super::seam::{is_same_crossing, is_same_surface};
 use super::shade::{Bsdf, LocalLight};
-use super::shading_batch::{BatchPoint, HitsByInstance, MaterialConstants, POINTS, Passed, PlacedMesh, ShadingBatch};
+use super::shading_batch::{
+    BatchPoint, HitsByInstance, MaterialConstants, POINTS, PassThrough, PlacedMesh, ShadingBatch,
+};
+use super::shadow::curve::ShadowRays;
 use super::sobol::mix;
 use super::surface::{HitPrim, Surface};
 use super::wave::{Path, RayClass, Wave};
@@ -28,7 +30,7 @@ const FEW: usize = 3;
 /// Rays that were traced together.
 #[derive(Clone, Copy)]
 pub(crate) enum TracedRays<'a> {
-    /// From eyes: the `i`th is that of sample `i`.
+    /// From the eye: the `i`th is that of sample `i`.
     PrimaryRays(&'a PrimaryRays),
     /// Others of one class.
     Wave(RayClass, &'a Wave),
@@ -37,14 +39,14 @@ pub(crate) enum TracedRays<'a> {
 impl<'a> TracedRays<'a> {
     pub(crate) fn rays(self) -> &'a [Ray] {
         match self {
-            Self::PrimaryRays(eyes) => eyes.rays(),
+            Self::PrimaryRays(primary_rays) => primary_rays.rays(),
             Self::Wave(_, wave) => &wave.rays,
         }
     }
 
     pub(crate) fn hits(self) -> &'a [Hit] {
         match self {
-            Self::PrimaryRays(eyes) => &eyes.hits,
+            Self::PrimaryRays(primary_rays) => &primary_rays.hits,
             Self::Wave(_, wave) => &wave.hits,
         }
     }
@@ -52,7 +54,7 @@ impl<'a> TracedRays<'a> {
     /// What the `i`th ray carries behind what it has hit, if that is a hole.
     fn path_through(self, i: usize) -> Path {
         match self {
-            Self::PrimaryRays(eyes) => eyes.path(i),
+            Self::PrimaryRays(primary_rays) => primary_rays.path(i),
             Self::Wave(_, wave) => Path { crossed: wave.crossed(i), ..wave.paths[i] },
         }
     }
@@ -60,7 +62,7 @@ impl<'a> TracedRays<'a> {
     /// What the `i`th ray carries.
     pub(crate) fn path(self, i: usize) -> Path {
         match self {
-            Self::PrimaryRays(eyes) => eyes.path(i),
+            Self::PrimaryRays(primary_rays) => primary_rays.path(i),
             Self::Wave(_, wave) => wave.paths[i],
         }
     }
@@ -68,7 +70,7 @@ impl<'a> TracedRays<'a> {
     /// Whether a ray may see what it meets weakened.
     pub(crate) fn has_weights(self) -> bool {
         match self {
-            Self::PrimaryRays(eyes) => eyes.are_immersed(),
+            Self::PrimaryRays(primary_rays) => primary_rays.are_immersed(),
             Self::Wave(..) => true,
         }
     }
@@ -155,17 +157,17 @@ impl Ranks {
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     /// Adds what eye rays see.
-    pub(super) fn shade_primary_rays(&mut self, eyes: &PrimaryRays) {
+    pub(super) fn shade_primary_rays(&mut self, primary_rays: &PrimaryRays) {
         let at_a_time = self.context.points_at_a_time;
-        for (start, hits) in (0..).step_by(at_a_time).zip(eyes.hits.chunks(at_a_time)) {
-            self.shade_some_primary_rays(eyes, (start, hits));
+        for (start, hits) in (0..).step_by(at_a_time).zip(primary_rays.hits.chunks(at_a_time)) {
+            self.shade_some_primary_rays(primary_rays, (start, hits));
             self.relieve();
             self.trace_followers();
         }
     }
 
     /// Adds what some eye rays see whose hits follow each other.
-    fn shade_some_primary_rays(&mut self, eyes: &PrimaryRays, (first, hits): (u32, &[Hit])) {
+    fn shade_some_primary_rays(&mut self, primary_rays: &PrimaryRays, (first, hits): (u32, &[Hit])) {
         let context = self.context;
         let mut by_instance = self.sort();
         for (start, eight) in (first..).step_by(LANES).zip(hits.chunks(LANES)) {
@@ -173,17 +175,19 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let first = eight[0].prim;
             let alike = eight.iter().all(|hit| hit.prim == first);
             if !(alike && eight[0].is_some() && by_instance.take(context, (start, eight.len()), first)) {
-                (start..).zip(eight).for_each(|(i, hit)| self.shade_primary_ray(eyes, &mut by_instance, i, hit));
+                (start..)
+                    .zip(eight)
+                    .for_each(|(i, hit)| self.shade_primary_ray(primary_rays, &mut by_instance, i, hit));
             }
         }
-        self.see_surroundings(TracedRays::PrimaryRays(eyes));
-        self.shade_by_instance(TracedRays::PrimaryRays(eyes), by_instance);
+        self.see_surroundings(TracedRays::PrimaryRays(primary_rays));
+        self.shade_by_instance(TracedRays::PrimaryRays(primary_rays), by_instance);
     }
 
-    fn shade_primary_ray(&mut self, eyes: &PrimaryRays, by_instance: &mut HitsByInstance, i: u32, hit: &Hit) {
+    fn shade_primary_ray(&mut self, primary_rays: &PrimaryRays, by_instance: &mut HitsByInstance, i: u32, hit: &Hit) {
         if hit.is_some() {
             if !by_instance.take(self.context, (i, 1), hit.prim) {
-                self.shade_one(TracedRays::PrimaryRays(eyes), i as usize);
+                self.shade_one(TracedRays::PrimaryRays(primary_rays), i as usize);
             }
         } else if self.context.shows_environment {
             self.buffers.missed.push(i);
@@ -262,10 +266,10 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     fn see_surroundings(&mut self, traced: TracedRays) {
         let mut missed = std::mem::take(&mut self.buffers.missed);
         match traced {
-            TracedRays::PrimaryRays(eyes) => {
+            TracedRays::PrimaryRays(primary_rays) => {
                 let samples = &mut self.samples;
                 let tell = |i: u32, radiance: Vec3| samples[i as usize].radiance += radiance;
-                self.context.sky.each_behind(&missed, eyes.columns(), tell);
+                self.context.sky.each_behind(&missed, primary_rays.columns(), tell);
             }
             TracedRays::Wave(_, wave) => {
                 let rays = missed.iter().map(|&i| (i, wave.rays[i as usize].dir, wave.paths[i as usize].cone_spread));
@@ -306,47 +310,48 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     ) {
         let context = self.context;
         let mesh = &context.scene.meshes[context.scene.instances[instance as usize].mesh as usize];
-        let Some(common) = &context.common[mesh.material as usize] else { return };
-        let (smooth, reads) = (!mesh.normals.is_empty(), common.mapped || !mesh.colors.is_empty());
-        let (bsdf, shiny, placement) = (&common.bsdf, common.shiny, context.world.placement(instance));
+        let Some(constants) = &context.material_constants[mesh.material as usize] else { return };
+        let (smooth, reads) = (!mesh.normals.is_empty(), constants.mapped || !mesh.colors.is_empty());
+        let (bsdf, needs_cones, placement) =
+            (&constants.bsdf, constants.needs_cones, context.world.placement(instance));
         batch.take(hits, by_instance, (traced, &context.absorption, &self.media), smooth);
         batch.find(smooth.then_some(placement));
-        if reads || shiny || context.looks_around_by_points() {
+        if reads || needs_cones || context.environment_needs_points() {
             batch.widen(traced);
         }
         if reads {
-            batch.read(context, traced, PlacedMesh { mesh, placement }, common);
+            batch.read(context, traced, PlacedMesh { mesh, placement }, constants);
         }
-        if !common.is_completed() {
+        if !constants.is_completed() {
             batch.blur(traced, bsdf);
         }
-        if shiny {
-            batch.bend(context, common, smooth.then_some(placement));
+        if needs_cones {
+            batch.bend(context, constants, smooth.then_some(placement));
         }
-        if common.spreads {
+        if constants.spreads {
             batch.retain(|ray| traced.path(ray).depth < context.depth);
         }
         for index in batch.left_out() {
             self.shade_one(traced, index as usize);
         }
-        batch.thin_out((common, reads), |at, passed| self.pass(traced, at, passed));
+        batch.thin_out((constants, reads), |at, passed| self.pass(traced, at, passed));
         if batch.is_empty() {
             return;
         }
         self.note_batch(traced, (instance, bsdf), batch);
-        batch.complete(context, traced, PlacedMesh { mesh, placement }, common);
-        batch.overlay(context, traced, PlacedMesh { mesh, placement }, common);
-        if !common.glass.is_some_and(|glass| glass.is_dark_inside && batch.sees_backs_alone()) {
-            self.show(traced, common, batch);
+        batch.complete(context, traced, PlacedMesh { mesh, placement }, constants);
+        batch.overlay(context, traced, PlacedMesh { mesh, placement }, constants);
+        if !constants.glass.is_some_and(|glass| glass.is_dark_inside && batch.sees_backs_alone()) {
+            self.show(traced, constants, batch);
         }
-        if common.sends_by_points() {
-            self.each_point(traced, common, batch, |tracer, point| {
+        if constants.sends_by_points() {
+            self.each_point(traced, constants, batch, |tracer, point| {
                 if point.path.depth < context.depth {
                     let crossing = point.crossing(context, &mut tracer.media, point.path.band);
                     tracer.reflect_and_refract(point, &crossing);
                 }
             });
-        } else if shiny && context.depth > 0 {
+        } else if needs_cones && context.depth > 0 {
             let (roulette, streams) = (self.roulette, &self.streams);
             let goes_on = |sample, path: &mut _| roulette.spin(streams, sample, path);
             batch.mirror(context, bsdf, traced, (goes_on, &mut self.starting[RayClass::Reflected as usize]));
@@ -354,28 +359,31 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     /// Sends the ray at this place of what was traced on behind what it has hit.
-    fn pass(&mut self, traced: TracedRays, at: usize, passed: Passed) {
+    fn pass(&mut self, traced: TracedRays, at: usize, passed: PassThrough) {
         let (context, class) = (self.context, traced.class());
         let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
-        let lessened = |path| match context.absorption.is_some() {
-            true => context.absorption.lessened(&self.media, ray, &path, hit),
+        let attenuated = |path| match context.absorption.is_some() {
+            true => context.absorption.attenuated(&self.media, ray, &path, hit),
             false => path,
         };
         match passed {
-            Passed::Back => self.continuing[class as usize].push_behind(*ray, lessened(path).behind_back(), *hit),
-            Passed::Covered(covered) if covered <= 0.0 => {
+            PassThrough::Back => {
+                self.continuing[class as usize].push_behind(*ray, attenuated(path).behind_back(), *hit)
+            }
+            PassThrough::Covered(coverage) if coverage <= 0.0 => {
                 self.continuing[class as usize].push(*ray, traced.path_through(at), *hit);
             }
-            Passed::Covered(covered) => self.go_on(ray, &lessened(path), hit, covered),
+            PassThrough::Covered(coverage) => self.go_on(ray, &attenuated(path), hit, coverage),
         }
     }
 
-    /// Remembers the points of an instance, whose material is `even` but for maps, that are the first surfaces of their samples.
-    fn note_batch(&mut self, traced: TracedRays, (instance, even): (u32, &Bsdf), batch: &ShadingBatch) {
+    /// Remembers the points of an instance, whose material is `unmapped` but for maps, that are the first surfaces of their
+    /// samples.
+    fn note_batch(&mut self, traced: TracedRays, (instance, unmapped): (u32, &Bsdf), batch: &ShadingBatch) {
         if self.firsts.is_empty() {
             return;
         }
-        for (at, sample, found) in batch.firsts(instance, even, self.context.world.center) {
+        for (at, sample, found) in batch.firsts(instance, unmapped, self.context.world.center) {
             let first = &mut self.firsts[sample as usize];
             if !first.is_some() && traced.path(at).straight {
                 *first = found;
@@ -384,23 +392,23 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     /// Adds what the points show of their surroundings and of each light, or sends the rays that find whether it arrives.
-    fn show(&mut self, traced: TracedRays, common: &MaterialConstants, batch: &mut ShadingBatch) {
-        let (context, bsdf) = (self.context, &common.bsdf);
-        let has_inside = common.has_inside();
-        if context.looks_around_by_points() || common.is_completed() {
-            self.each_point(traced, common, batch, |tracer, point| tracer.look_around(point));
+    fn show(&mut self, traced: TracedRays, constants: &MaterialConstants, batch: &mut ShadingBatch) {
+        let (context, bsdf) = (self.context, &constants.bsdf);
+        let has_inside = constants.has_inside();
+        if context.environment_needs_points() || constants.is_completed() {
+            self.each_point(traced, constants, batch, |tracer, point| tracer.shade_environment(point));
         } else if !context.is_dark || bsdf.shines() {
-            batch.look_around((bsdf, has_inside), &context.sky, context.scene.ambient);
+            batch.shade_environment((bsdf, has_inside), &context.sky, context.scene.ambient);
             batch.shown().for_each(|(sample, everywhere)| self.add(sample, everywhere));
         }
         let absorbs = context.absorption.is_some();
         let within = absorbs && batch.certain().any(|i| traced.path(batch.arrival(i).0).media != Media::OUTSIDE);
-        let what = (bsdf, common.shiny, has_inside);
+        let what = (bsdf, constants.needs_cones, has_inside);
         let mut draws = std::mem::take(&mut self.buffers.draws);
         draws.clear();
         for (number, light) in (0..).zip(&context.lights) {
             if !light.is_area() {
-                batch.shine(what, light, None);
+                batch.shade_light(what, light, None);
                 self.choose(traced, (light, number), batch);
                 self.ask_for(traced, light, batch, (within, None));
                 continue;
@@ -409,7 +417,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
                 draws.extend(batch.certain().map(|i| self.draws_for_lights(traced, batch, i)));
             }
             for place in 0..batch.draw(draws.iter_mut().map(|(i, draws, rays)| (*i, draws.spread(*rays), *rays))) {
-                batch.shine(what, light, Some(place));
+                batch.shade_light(what, light, Some(place));
                 self.choose(traced, (light, mix(number, place + 1)), batch);
                 self.ask_for(traced, light, batch, (within, Some(place)));
             }
@@ -448,14 +456,14 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let context = self.context;
         let absorbs = context.absorption.is_some();
         if !light.shadows {
-            return batch.shone().for_each(|(sample, radiance)| self.add(sample, radiance));
+            return batch.lit_samples().for_each(|(sample, radiance)| self.add(sample, radiance));
         }
         if within {
             batch.send_within(&mut self.shadows, traced);
         } else {
             batch.send(&mut self.shadows, absorbs);
         }
-        for (i, radiance) in batch.grazed() {
+        for (i, radiance) in batch.grazing_points() {
             let at = batch.arrival(i).0;
             let (ray, hit) = (&traced.rays()[at], &traced.hits()[at]);
             let drawn = place.map(|place| batch.drawn(i, place));
@@ -470,29 +478,29 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     fn each_point(
         &mut self,
         traced: TracedRays,
-        common: &MaterialConstants,
+        constants: &MaterialConstants,
         batch: &ShadingBatch,
         mut act: impl FnMut(&mut Self, &PathVertex<BatchPoint>),
     ) {
         let context = self.context;
-        let material = (common.material, &context.scene.materials[common.material as usize]);
-        let has_inside = common.has_inside();
+        let material = (constants.material, &context.scene.materials[constants.material as usize]);
+        let has_inside = constants.has_inside();
         for i in batch.certain() {
             let (at, weight, width) = batch.arrival(i);
             let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
             let since = if context.absorption.is_some() { hit.t } else { path.since };
-            let ground = batch.ground(i, material, has_inside);
-            let bare;
-            let bsdf = match batch.whole(i) {
-                Some(whole) => whole,
+            let surface = batch.point(i, material, has_inside);
+            let found;
+            let bsdf = match batch.point_bsdf(i) {
+                Some(bsdf) => bsdf,
                 None => {
-                    bare = ground.covered(&common.bsdf);
-                    &bare
+                    found = surface.bsdf(&constants.bsdf);
+                    &found
                 }
             };
             let path = Path { weight, since, ..path };
             let touches = traced.touches(at);
-            act(self, &PathVertex { ray, hit, path, width, surface: &ground, bsdf, touches });
+            act(self, &PathVertex { ray, hit, path, width, surface: &surface, bsdf, touches });
         }
     }
 }

@@ -9,7 +9,7 @@ use super::context::Context;
 use super::frame::{Frame, resolve_each, veil_each};
 use super::layers::{self, FirstSurface, LayerPixel};
 use super::observer::Observer;
-use super::pixel::sample_offsets;
+use super::sample_offsets::sample_offsets;
 use super::sampling::{Sampled, Sampling};
 use super::view::View;
 use super::whitted::{Sample, Tracer};
@@ -122,18 +122,28 @@ pub(super) fn render_some<A: Accel, P: Observer>(
         let spent = if cpu.is_zero() { wall } else { cpu };
         Some(Alone { pixels, spent, counts: std::mem::take(&mut tracer.counts) })
     };
-    let (finished, _, complete) = each_tile(context, accel, tiles, progress, work);
+    let TracedTiles { finished, complete, .. } = each_tile(context, accel, tiles, progress, work);
     (finished, complete)
 }
 
-/// Renders every tile; the picture, how it was sampled, the counts of all threads, and whether nothing was cut short by the user.
+/// A picture of tiles that were rendered.
+pub(crate) struct RenderedTiles<P> {
+    pub picture: Picture,
+    pub sampled: Sampled,
+    /// Those of each thread.
+    pub counts: Vec<ByClass<P>>,
+    /// Whether nothing was cut short by the user.
+    pub complete: bool,
+}
+
+/// Renders every tile.
 pub(crate) fn render_tiles<A: Accel, P: Observer>(
     context: &Context,
     accel: &A,
     view: &View,
     settings: &Settings,
     progress: &dyn Progress,
-) -> (Picture, Sampled, Vec<ByClass<P>>, bool) {
+) -> RenderedTiles<P> {
     let frame = Frame::new(context, accel, view, settings);
     let whole = Mutex::new(Whole::new(settings, frame.has_veil));
     let keep = |pixels: TilePixels| whole.lock().unwrap_or_else(PoisonError::into_inner).keep(&pixels);
@@ -141,7 +151,7 @@ pub(crate) fn render_tiles<A: Accel, P: Observer>(
     let (counts, complete) = match &settings.sampling {
         Sampling::Uniform => {
             let work = |tracer: &mut Tracer<A, P>, &tile: &Tile| frame.render(tracer, tile).map(keep);
-            let (_, counts, complete) = each_tile(context, accel, &tiles, progress, work);
+            let TracedTiles { counts, complete, .. } = each_tile(context, accel, &tiles, progress, work);
             (counts, complete)
         }
         Sampling::Adaptive(how) => adaptive::render_all(&frame, how, (context, accel), progress, &tiles, &keep),
@@ -151,7 +161,7 @@ pub(crate) fn render_tiles<A: Accel, P: Observer>(
     if let Some(layers) = &mut picture.layers {
         add_channels(&sampled, layers);
     }
-    (picture, sampled, counts, complete)
+    RenderedTiles { picture, sampled, counts, complete }
 }
 
 /// The picture, as far as it is finished, and how its pixels were sampled; the others had no rays.
@@ -258,7 +268,7 @@ pub(crate) fn cost_tiles<A: Accel, P: Observer, T: Copy + Default + Send>(
         frame.trace(tracer, tile, pixels, each).map(|()| (tile, costs))
     };
     let tiles = tiles(settings.width, settings.height);
-    let (finished, _, complete) = each_tile(context, accel, &tiles, progress, work);
+    let TracedTiles { finished, complete, .. } = each_tile(context, accel, &tiles, progress, work);
     let mut all = vec![T::default(); settings.width as usize * settings.height as usize];
     for (tile, costs) in finished {
         for ((x, y), cost) in tile.places().zip(costs) {
@@ -284,7 +294,7 @@ pub(crate) fn trace_sample<A: Accel, P: Observer>(
     let place = frame.places((x, y)).nth(sample as usize)?;
     let mut tracer = Tracer::<A, P>::new(context, accel, &());
     tracer.reset(1, false, &frame.media);
-    let (ray, path) = frame.eye(tracer.center()).ray_with_path(place, tracer.eyes.media);
+    let (ray, path) = frame.eye(tracer.center()).ray_with_path(place, tracer.primary_rays.media);
     tracer.start(ray, path);
     tracer.trace().then(|| (tracer.samples[0], tracer.counts))
 }
@@ -298,15 +308,23 @@ pub(crate) enum Together {
     Pixel,
 }
 
-/// Has every tile, however it is told, worked on by some thread, which take them in order: what came of them, what the threads
-/// counted, and whether that was all.
+/// What came of tiles that were worked on.
+pub(super) struct TracedTiles<T, P> {
+    pub finished: Vec<T>,
+    /// Those of each thread.
+    pub counts: Vec<ByClass<P>>,
+    /// Whether all were finished.
+    pub complete: bool,
+}
+
+/// Has every tile, however it is told, worked on by some thread, which take them in order.
 pub(super) fn each_tile<A: Accel, P: Observer, W: Sync, T: Send>(
     context: &Context,
     accel: &A,
     all: &[W],
     progress: &dyn Progress,
     work: impl Fn(&mut Tracer<A, P>, &W) -> Option<T> + Sync,
-) -> (Vec<T>, Vec<ByClass<P>>, bool) {
+) -> TracedTiles<T, P> {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let take = |_: rayon::BroadcastContext| {
         let mut tracer = Tracer::<A, P>::new(context, accel, progress);
@@ -321,7 +339,7 @@ pub(super) fn each_tile<A: Accel, P: Observer, W: Sync, T: Send>(
     let (finished, counts): (Vec<_>, Vec<_>) = rayon::broadcast(take).into_iter().unzip();
     let finished: Vec<T> = finished.into_iter().flatten().collect();
     let complete = finished.len() == all.len();
-    (finished, counts, complete)
+    TracedTiles { finished, counts, complete }
 }
 
 /// Pixels whose samples are traced together at most.
@@ -515,9 +533,9 @@ impl Frame<'_> {
             tracer.reset(places.len() * self.offsets.len(), self.settings.layers, &self.media);
             let eye = self.eye(tracer.center());
             if self.settings.lens.is_some() {
-                tracer.eyes.send(&eye, places.iter().flat_map(|&at| self.places(at)));
+                tracer.primary_rays.send(&eye, places.iter().flat_map(|&at| self.places(at)));
             } else {
-                tracer.eyes.send_each(&eye, places, &self.offsets);
+                tracer.primary_rays.send_each(&eye, places, &self.offsets);
             }
             if !tracer.trace() {
                 return None;

@@ -111,6 +111,11 @@ impl Queue {
         self.rays.len()
     }
 
+    /// What the rays that wait carry.
+    pub(crate) fn paths_mut(&mut self) -> &mut [Path] {
+        &mut self.paths
+    }
+
     /// Adds a ray, which goes on behind `after` or starts there.
     pub(crate) fn push(&mut self, ray: Ray, path: Path, after: Hit) {
         self.rays.push(ray);
@@ -126,11 +131,11 @@ impl Queue {
     /// Moves the last rays, at most `limit`, into `wave`.
     ///
     /// Taking from the end bounds the memory that trees with many branches need: a slice is traced down to its leaves
-    /// before the rays in front of it. More than `whole` rays are put in the order of their samples before, so that where
+    /// before the rays in front of it. More than `sort_above` rays are put in the order of their samples before, so that where
     /// they are cut does not depend on the order in which points were shaded.
-    pub(crate) fn take(&mut self, wave: &mut Wave, (limit, whole): (usize, usize)) {
+    pub(crate) fn take(&mut self, wave: &mut Wave, (limit, sort_above): (usize, usize)) {
         wave.clear();
-        if self.rays.len() > whole {
+        if self.rays.len() > sort_above {
             self.put_in_order(wave);
         }
         let start = self.rays.len().saturating_sub(limit);

@@ -9,22 +9,22 @@
 
 use super::Progress;
 use super::alpha_voids::Cones;
-use super::asking::Asking;
 use super::branch::{PathVertex, ShadingPoint};
 use super::by_class::ByClass;
 use super::context::{Context, ENVIRONMENT_RAYS_LIMIT, FOLLOWERS, SHADOW_LIMIT};
 use super::draws::{Draws, Purpose, Stream};
+use super::environment_rays::{EnvironmentPoint, EnvironmentRays};
 use super::glint;
 use super::layers::FirstSurface;
 use super::media::{Crossing, MediaTable, Medium};
 use super::no_prune::look_up_in_vain;
 use super::observer::Observer;
 use super::primary_rays::{PrimaryQuery, PrimaryRays};
+use super::ray_caster::RayCaster;
 use super::roulette::Roulette;
 use super::shade::{Bsdf, Incident, LocalLight, Reader};
 use super::shade_hits::ShadingBuffers;
 use super::shadow::ShadowQueue;
-use super::sky::{EnvironmentPoint, EnvironmentRays};
 use super::sobol::mix;
 use super::surface::{HitPrim, Surface};
 use super::wave::{Path, Queue, RayClass, Wave};
@@ -52,8 +52,8 @@ pub(crate) struct Sample {
 /// One worker: its buffers are reused from tile to tile.
 pub(crate) struct Tracer<'a, A: Accel, P> {
     pub(super) context: &'a Context<'a>,
-    asking: Asking<'a, A>,
-    pub eyes: PrimaryRays,
+    caster: RayCaster<'a, A>,
+    pub primary_rays: PrimaryRays,
     /// Rays that start, by class.
     pub(super) starting: [Queue; 3],
     /// Rays that go on behind a hit, by class.
@@ -90,8 +90,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     pub(crate) fn new(context: &'a Context<'a>, accel: &'a A, progress: &'a dyn Progress) -> Self {
         Self {
             context,
-            asking: Asking::new(accel, progress),
-            eyes: PrimaryRays::default(),
+            caster: RayCaster::new(accel, progress),
+            primary_rays: PrimaryRays::default(),
             starting: Default::default(),
             continuing: Default::default(),
             wave: Wave::default(),
@@ -114,15 +114,15 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.context.world.center
     }
 
-    /// Prepares for `samples` samples, whose eye rays are added to [`Self::eyes`], and start inside of `media`.
+    /// Prepares for `samples` samples, whose eye rays are added to [`Self::primary_rays`], and start inside of `media`.
     pub(crate) fn reset(&mut self, samples: usize, layers: bool, media: &[Medium]) {
         self.counts.each_mut().into_iter().for_each(|probe| probe.batch(samples));
         self.starting.iter_mut().chain(&mut self.continuing).for_each(Queue::clear);
         self.shadows.clear();
         self.hotspots.clear();
         self.environment_rays.clear();
-        self.eyes.clear();
-        self.eyes.media = self.media.reset(media);
+        self.primary_rays.clear();
+        self.primary_rays.media = self.media.reset(media);
         self.streams.clear();
         self.roulette = Roulette::default();
         self.by_chance.clear();
@@ -142,7 +142,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     pub(crate) fn trace(&mut self) -> bool {
         self.trace_primary_rays();
         self.trace_waves();
-        !self.asking.cancelled
+        !self.caster.cancelled
     }
 
     /// Traces what follows eye rays, once so much waits that memory would fill.
@@ -156,7 +156,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Traces all rays that wait, and what follows them.
     fn trace_waves(&mut self) {
         while let Some(class) = self.next_wave() {
-            if self.asking.cancelled {
+            if self.caster.cancelled {
                 return;
             }
             let wave = std::mem::take(&mut self.wave);
@@ -166,22 +166,22 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// Traces the rays of all eyes and shades what they hit.
+    /// Traces all primary rays and shades what they hit.
     fn trace_primary_rays(&mut self) {
-        let mut eyes = std::mem::take(&mut self.eyes);
+        let mut primary_rays = std::mem::take(&mut self.primary_rays);
         {
-            let PrimaryQuery { rays, pencil, cones, hits } = eyes.ask();
+            let PrimaryQuery { rays, pencil, cones, hits } = primary_rays.ask();
             let of = (RayClass::Primary, self.samples.len());
-            let before = self.context.before::<P>(of, rays, Cones::PrimaryRays(cones));
-            let filter = before.as_ref().map(|before| before as &dyn IntersectFilter);
+            let alpha_filter = self.context.alpha_filter::<P>(of, rays, Cones::PrimaryRays(cones));
+            let filter = alpha_filter.as_ref().map(|filter| filter as &dyn IntersectFilter);
             let queries = HitQueries { rays, pencil: pencil.as_ref(), after: None, filter };
-            self.asking.first_hits(&queries, hits, self.counts.of(RayClass::Primary));
+            self.caster.first_hits(&queries, hits, self.counts.of(RayClass::Primary));
         }
-        if !self.asking.cancelled {
-            self.shade_primary_rays(&eyes);
+        if !self.caster.cancelled {
+            self.shade_primary_rays(&primary_rays);
             self.trace_shadows();
         }
-        self.eyes = eyes;
+        self.primary_rays = primary_rays;
     }
 
     /// Takes the next wave and finds its hits. Rays that go on come before rays that start a deeper generation.
@@ -189,16 +189,20 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let class = self.take_wave()?;
         let wave = &mut self.wave;
         let mut hits = std::mem::take(&mut wave.hits);
-        let before = self.context.before::<P>((class, self.samples.len()), &wave.rays, (&*wave).into());
-        let filter = before.as_ref().map(|before| before as &dyn IntersectFilter);
+        let alpha_filter = self.context.alpha_filter::<P>((class, self.samples.len()), &wave.rays, (&*wave).into());
+        let filter = alpha_filter.as_ref().map(|filter| filter as &dyn IntersectFilter);
         let after = (!wave.starts).then_some(wave.after.as_slice());
         let queries = HitQueries { rays: &wave.rays, pencil: None, after, filter };
-        self.asking.first_hits(&queries, &mut hits, self.counts.of(class));
+        self.caster.first_hits(&queries, &mut hits, self.counts.of(class));
         wave.hits = hits;
         Some(class)
     }
 
     fn take_wave(&mut self) -> Option<RayClass> {
+        if self.media.is_large() {
+            let queues = self.starting.iter_mut().chain(&mut self.continuing);
+            self.media.retain(queues.flat_map(Queue::paths_mut).map(|path| &mut path.media));
+        }
         let wave = &mut self.wave;
         let limits = (WAVE_LIMIT, WAVE_LIMIT.min(self.context.points_at_a_time));
         for (starts, queues) in [(false, &mut self.continuing), (true, &mut self.starting)] {
@@ -215,17 +219,17 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let samples = &mut self.samples;
         let mut arrive = |sample: u32, light: Vec3| samples[sample as usize].radiance += light;
         if self.shadows.len() > 0 {
-            self.shadows.trace((self.context, &mut self.media), &mut self.asking, &mut self.counts.shadow, &mut arrive);
+            self.shadows.trace((self.context, &mut self.media), &mut self.caster, &mut self.counts.shadow, &mut arrive);
         }
         if self.hotspots.len() > 0 {
             self.hotspots.trace(
                 (self.context, &mut self.media),
-                &mut self.asking,
+                &mut self.caster,
                 &mut self.counts.shadow,
                 &mut arrive,
             );
         }
-        self.environment_rays.trace((self.context, &mut self.media), &mut self.asking, &mut self.counts.shadow, arrive);
+        self.environment_rays.trace((self.context, &mut self.media), &mut self.caster, &mut self.counts.shadow, arrive);
     }
 
     /// Traces shadow rays once many wait. In between a sample sees one point at most, so that in whatever order these are
@@ -258,14 +262,15 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Adds what the surface at a hit shows by itself, and queues the rays that find the rest.
     pub(super) fn shade(&mut self, class: RayClass, Arrival { ray, hit, touches }: Arrival, path: &Path) {
         let context = self.context;
-        let lessened = context.absorption.is_some().then(|| context.absorption.lessened(&self.media, ray, path, hit));
-        let (before, path) = (path, lessened.as_ref().unwrap_or(path));
+        let attenuated =
+            context.absorption.is_some().then(|| context.absorption.attenuated(&self.media, ray, path, hit));
+        let (arriving, path) = (path, attenuated.as_ref().unwrap_or(path));
         let target = HitPrim::new(context.scene, context.world, hit.prim);
         let material = target.material;
         // Rays to the hotspot end at what would turn them.
         let seeing = path.skips_hotspot && context.turns(material);
-        let seeing = seeing.then(|| [before, path].map(|path| Path { skips_hotspot: false, ..*path }));
-        let (before, path) = seeing.as_ref().map_or((before, path), |[before, path]| (before, path));
+        let seeing = seeing.then(|| [arriving, path].map(|path| Path { skips_hotspot: false, ..*path }));
+        let (arriving, path) = seeing.as_ref().map_or((arriving, path), |[arriving, path]| (arriving, path));
         let width = path.cone_width + path.cone_spread * hit.t;
         let mut surface = Surface::new(context.world, target, ray, hit, width);
 
@@ -275,12 +280,12 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
         let reader = Reader { store: context.textures, patch: surface.patch.as_ref(), known: &[] };
         let base = reader.base(material);
-        let covered = material.alpha_mode.covers(base.w);
-        if covered <= 0.0 {
-            return self.continuing[class as usize].push(*ray, *before, *hit);
+        let coverage = material.alpha_mode.covers(base.w);
+        if coverage <= 0.0 {
+            return self.continuing[class as usize].push(*ray, *arriving, *hit);
         }
-        if covered < 1.0 {
-            self.go_on(ray, path, hit, covered);
+        if coverage < 1.0 {
+            self.go_on(ray, path, hit, coverage);
         }
 
         // Local colour: emitted, from everywhere, from each light.
@@ -294,14 +299,14 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             surface: &surface,
             bsdf: &bsdf,
             touches,
-            path: Path { weight: path.weight * covered, ..*path },
+            path: Path { weight: path.weight * coverage, ..*path },
         };
         if context.no_prune {
             look_up_in_vain(&surface, context.textures);
         }
         let crossing = point.crossing(context, &mut self.media, path.band);
         if context.no_prune || !bsdf.is_dark() {
-            self.look_around(&point);
+            self.shade_environment(&point);
             self.light(&point, &crossing);
         }
 
@@ -313,7 +318,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Adds what a point shows by itself and of its surroundings, or sends the rays that find what hides those.
-    pub(super) fn look_around<G: ShadingPoint>(&mut self, point: &PathVertex<G>) {
+    pub(super) fn shade_environment<G: ShadingPoint>(&mut self, point: &PathVertex<G>) {
         let (context, surface, bsdf) = (self.context, point.surface, point.bsdf);
         let (weight, sample) = (point.path.weight, point.ray.sample);
         let [open, through] = bsdf.ambient(&surface.seen(), &context.sky, context.scene.ambient);
@@ -330,8 +335,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Goes on behind a surface that covers a part.
-    pub(super) fn go_on(&mut self, ray: &Ray, path: &Path, hit: &Hit, covered: f32) {
-        let weight = path.weight * (1.0 - covered);
+    pub(super) fn go_on(&mut self, ray: &Ray, path: &Path, hit: &Hit, coverage: f32) {
+        let weight = path.weight * (1.0 - coverage);
         if self.context.is_alive(weight, path.part) {
             let mut path = Path { weight, ..path.turned(RayClass::Refracted, ON) };
             if self.roulette.spin(&self.streams, ray.sample, &mut path) {
@@ -374,7 +379,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         for (number, light) in (0..).zip(&context.lights) {
             if !light.is_area() {
                 if let Some(incident) = light.incident(position) {
-                    self.shine(point, crossing, (light, number), &incident, 1.0);
+                    self.shade_light(point, crossing, (light, number), &incident, 1.0);
                 }
                 continue;
             }
@@ -382,14 +387,14 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             let spread = draws.get_or_insert_with(|| self.draws(point, Purpose::Lights)).spread(rays);
             for k in 0..rays {
                 if let Some(incident) = light.incident_from(position, spread.point(k)) {
-                    self.shine(point, crossing, (light, mix(number, k + 1)), &incident, 1.0 / rays as f32);
+                    self.shade_light(point, crossing, (light, mix(number, k + 1)), &incident, 1.0 / rays as f32);
                 }
             }
         }
     }
 
     /// Light of one point of a light that is so much of it: without shadows at once, with them when its ray has come through.
-    fn shine(
+    fn shade_light(
         &mut self,
         point: &PathVertex<Surface>,
         crossing: &Crossing,

@@ -4,6 +4,7 @@
 //! the world is `f64`. Units are metres, angles radians, colours linear Rec. 709, unless a field says otherwise.
 
 pub mod camera;
+mod check;
 pub mod color;
 pub(crate) mod corners;
 pub mod default_light;
@@ -17,17 +18,16 @@ pub mod material;
 pub mod merge;
 pub mod mesh;
 pub mod panorama;
-mod sound;
 pub mod texture;
 
 pub use camera::{Camera, Projection};
+pub use check::SceneFault;
 pub use hints::{MAX_DEPTH, MAX_STOPS, RenderHints};
 pub use light::{Falloff, Light, LightKind};
 pub use lobes::{Anisotropy, Coat, DiffuseTransmission, Iridescence, Sheen};
 pub use material::{AlphaMode, Material, MetalRough, Phong, Reflection, TexCoords, TextureRef, UvTransform};
 pub use mesh::{Cone, Instance, Mesh, Plane, Polygon, Sphere};
 pub use panorama::Panorama;
-pub use sound::SceneFault;
 pub use texture::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Texture, Wrap};
 
 use crate::math::Vec3;

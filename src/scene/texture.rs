@@ -1,6 +1,6 @@
 //! Pictures that cover surfaces.
 
-use crate::pages::Paged;
+use crate::huge_pages::Paged;
 
 /// A bitmap and how to read between and beyond its texels.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]

@@ -1,7 +1,7 @@
 //! What is behind a model when nobody says.
 
 use super::program::{CUBE, Folder, picture};
-use meshray::image::look::{as_is, look};
+use meshray::image::statistics::{as_is, look};
 
 /// A triangle in a glTF file, with this material.
 fn triangle(material: &str) -> String {

@@ -242,21 +242,21 @@ impl Accel for TwoLevel<'_> {
         &self,
         rays: &[Ray],
         filter: Option<&dyn OccludedFilter>,
-        blocked: &mut [bool],
+        occluded: &mut [bool],
         scratch: &mut LevelScratch,
         probe: &mut P,
     ) {
         self.renumber(rays, &mut scratch.rays);
         let numbered = filter.map(|of| Numbered { instanced: self.instanced, of });
         let stored = numbered.as_ref().map(|filter| filter as &dyn OccludedFilter);
-        self.stored.occluded_filtered(&scratch.rays, stored, blocked, &mut scratch.stored, probe);
-        for (i, (ray, blocked)) in rays.iter().zip(blocked).enumerate().filter(|(_, (_, blocked))| !**blocked) {
+        self.stored.occluded_filtered(&scratch.rays, stored, occluded, &mut scratch.stored, probe);
+        for (i, (ray, occluded)) in rays.iter().zip(occluded).enumerate().filter(|(_, (_, occluded))| !**occluded) {
             let (mut query, usable) = Query::new(self.stored.shapes(), ray, ray.t_min, Occluded::by(filter, i, Exact));
             if usable {
                 self.walk(&mut query, scratch, probe);
             }
-            *blocked = query.goal.found;
-            if *blocked {
+            *occluded = query.goal.found;
+            if *occluded {
                 probe.found();
             }
         }

@@ -38,18 +38,18 @@ impl OccludedFilter for Sieve {
 pub(crate) fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 10]> {
     let mut scratch = accel.scratch();
     let mut first = vec![Hit::MISS; rays.len()];
-    let mut blocked = vec![false; rays.len()];
+    let mut occluded = vec![false; rays.len()];
     let mut stopped = vec![false; rays.len()];
     let mut second = first.clone();
     accel.occluded_filtered(rays, Some(&Sieve), &mut stopped, &mut scratch, &mut NoProbe);
     accel.closest(rays, &mut first, &mut scratch, &mut NoProbe);
-    accel.occluded(rays, &mut blocked, &mut scratch, &mut NoProbe);
+    accel.occluded(rays, &mut occluded, &mut scratch, &mut NoProbe);
     accel.next(rays, &first, &mut second, &mut scratch, &mut NoProbe);
     let row = |(((a, b), c), d): (((&Hit, &bool), &Hit), &bool)| {
         let ([t, u, v, p], [t2, u2, v2, p2]) = (a.bits(), c.bits());
         [t, u, v, p, u32::from(*b), t2, u2, v2, p2, u32::from(*d)]
     };
-    first.iter().zip(&blocked).zip(&second).zip(&stopped).map(row).collect()
+    first.iter().zip(&occluded).zip(&second).zip(&stopped).map(row).collect()
 }
 
 /// How many rays are answered otherwise than by brute force.
@@ -226,13 +226,13 @@ fn shapes_without_a_word_on_it_are_opaque() {
     let opaque = Shapes { opaque: BitSet::filled(shapes.len(), true), ..shapes };
     let rays = rays(&opaque, 20);
     for kind in AccelKind::ALL {
-        let blocked = |shapes| {
-            let (accel, mut blocked) = (AnyAccel::build(kind, shapes, &AccelParams::DEFAULT), vec![false; rays.len()]);
-            accel.occluded(&rays, &mut blocked, &mut accel.scratch(), &mut NoProbe);
-            blocked
+        let occluded = |shapes| {
+            let (accel, mut occluded) = (AnyAccel::build(kind, shapes, &AccelParams::DEFAULT), vec![false; rays.len()]);
+            accel.occluded(&rays, &mut occluded, &mut accel.scratch(), &mut NoProbe);
+            occluded
         };
-        let found = blocked(&silent);
-        assert!(found == blocked(&opaque) && found.iter().any(|&b| b), "{kind}");
+        let found = occluded(&silent);
+        assert!(found == occluded(&opaque) && found.iter().any(|&b| b), "{kind}");
     }
 }
 

@@ -29,9 +29,9 @@ impl<'a> Surface<'a> {
     }
 
     fn is_blocked(&self, ray: &Ray) -> bool {
-        let mut blocked = [false];
-        self.accel.occluded(&[*ray], &mut blocked, &mut self.accel.scratch(), &mut NoProbe);
-        blocked[0]
+        let mut occluded = [false];
+        self.accel.occluded(&[*ray], &mut occluded, &mut self.accel.scratch(), &mut NoProbe);
+        occluded[0]
     }
 
     /// Places of hits on the way of a ray.

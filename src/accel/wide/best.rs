@@ -39,7 +39,7 @@ pub(super) struct Best {
 
 /// What a ray meets of a block.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Met {
+pub(super) struct BlockHits {
     /// Between which distances, where that is certain.
     low: Row,
     high: Row,
@@ -48,7 +48,7 @@ pub(super) struct Met {
     pub open: u32,
 }
 
-impl Met {
+impl BlockHits {
     pub(super) const NOTHING: Self = Self { low: [0.0; LANES], high: [0.0; LANES], hit: 0, open: 0 };
 }
 
@@ -138,17 +138,17 @@ impl Seeker {
 
     /// What is met of a leaf, whose index is below the number of blocks.
     #[inline(always)]
-    pub(super) fn meet<S: Simd>(&self, s: S, sight: &Sight, tree: &Tree, leaf: u32) -> Met {
+    pub(super) fn meet<S: Simd>(&self, s: S, sight: &Sight, tree: &Tree, leaf: u32) -> BlockHits {
         let (index, count) = Child::block(leaf);
         self.met(s, sight, &sight.look(s, &tree.blocks[index as usize].corners), count)
     }
 
     #[inline(always)]
-    fn met<S: Simd>(&self, s: S, sight: &Sight, look: &Look<S>, count: u32) -> Met {
+    fn met<S: Simd>(&self, s: S, sight: &Sight, look: &Look<S>, count: u32) -> BlockHits {
         let [low, high] = look.distances(s, sight);
         let in_time = s.at_most(low, s.splat(self.best.high)) & s.at_most(s.splat(self.t_min), high);
         let (hit, unsure) = (look.verdicts.hit & in_time & lanes(count), look.verdicts.unsure & lanes(count));
-        Met { low: s.store(low), high: s.store(high), hit, open: hit | unsure }
+        BlockHits { low: s.store(low), high: s.store(high), hit, open: hit | unsure }
     }
 
     /// Takes what is met of a block, and tells whether nothing more can matter.
@@ -159,7 +159,7 @@ impl Seeker {
         shapes: &Shapes,
         batch: &W,
         index: u32,
-        met: &Met,
+        met: &BlockHits,
     ) -> bool {
         let (prims, mut open) = (&tree.blocks[index as usize].prims, met.open);
         while open != 0 {

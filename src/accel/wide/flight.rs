@@ -7,7 +7,7 @@
 
 use std::marker::PhantomData;
 
-use super::best::{Met, Seeker};
+use super::best::{BlockHits, Seeker};
 use super::node::{Child, Node, Tree};
 use super::pending_hits::PendingHits;
 use super::prepared::{PreparedRay, PreparedRays};
@@ -152,7 +152,7 @@ impl<W: QueryBatch, B: BoxMargins> Kernel for InFlight<'_, W, B> {
         for number in 0..u32::BITS {
             flight.start(s, slots, number, &mut queue);
         }
-        let mut met = [Met::NOTHING; SLOTS];
+        let mut met = [BlockHits::NOTHING; SLOTS];
         let mut nodes = slots.whereabouts(s).nodes;
         while slots.taken != 0 {
             flight.step(s, slots, nodes);
@@ -282,7 +282,7 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
     /// Every ray that is at a leaf tests it and goes on; those that have their answer by that are returned. First all are
     /// tested, then what was hit is looked at: which that is cannot be predicted, and so no test waits for another's outcome.
     #[inline(always)]
-    fn test<S: Simd>(&self, s: S, slots: &mut Slots, mut leaves: u32, met: &mut [Met; SLOTS]) -> u32 {
+    fn test<S: Simd>(&self, s: S, slots: &mut Slots, mut leaves: u32, met: &mut [BlockHits; SLOTS]) -> u32 {
         let (mut turn, mut open, mut answered) = (leaves, 0, 0);
         while turn != 0 {
             let number = turn.trailing_zeros();

@@ -96,8 +96,8 @@ mod tests {
             listed.closest(&rays, a, &mut (), &mut NoProbe);
             brute.closest(&rays, b, &mut (), &mut NoProbe);
             assert_eq!(format!("{a:?}"), format!("{b:?}"), "{name}");
-            let mut blocked = [vec![false; rays.len()], vec![false; rays.len()]];
-            let [a, b] = &mut blocked;
+            let mut occluded = [vec![false; rays.len()], vec![false; rays.len()]];
+            let [a, b] = &mut occluded;
             listed.occluded(&rays, a, &mut (), &mut NoProbe);
             brute.occluded(&rays, b, &mut (), &mut NoProbe);
             assert_eq!(a, b, "{name}");

@@ -2,10 +2,10 @@
 
 use crate::accel::probe::{Extent, NodeId, Visit};
 use crate::accel::{NO_PRIM, Shapes};
+use crate::huge_pages::Paged;
 use crate::math::aabb::Aabb;
 use crate::math::simd::{LANES, Row};
 use crate::math::triangles::{Corners8, NO_CORNERS};
-use crate::pages::Paged;
 use crate::parts::cut;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;

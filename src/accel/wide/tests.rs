@@ -18,12 +18,12 @@ fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> String {
     let hits = first_hits(accel, rays);
     let mut behind = vec![Hit::MISS; rays.len()];
     accel.next(rays, &hits, &mut behind, &mut scratch, &mut NoProbe);
-    let mut blocked = vec![false; rays.len()];
-    accel.occluded(rays, &mut blocked, &mut scratch, &mut NoProbe);
+    let mut occluded = vec![false; rays.len()];
+    accel.occluded(rays, &mut occluded, &mut scratch, &mut NoProbe);
     let mut stopped = vec![false; rays.len()];
     accel.occluded_filtered(rays, Some(&Sieve), &mut stopped, &mut scratch, &mut NoProbe);
     let bits = |hits: &[Hit]| hits.iter().map(Hit::bits).collect::<Vec<_>>();
-    format!("{:?} {:?} {blocked:?} {stopped:?}", bits(&hits), bits(&behind))
+    format!("{:?} {:?} {occluded:?} {stopped:?}", bits(&hits), bits(&behind))
 }
 
 fn first_hits<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<Hit> {

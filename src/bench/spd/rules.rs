@@ -200,10 +200,10 @@ impl<A: Accel> Tracer<'_, A> {
             part.hits += 1;
             self.follow(ray, hit, last, &mut part);
         }
-        let mut blocked = vec![false; part.shadow.len()];
-        self.accel.occluded(&part.shadow, &mut blocked, &mut scratch, &mut NoProbe);
+        let mut occluded = vec![false; part.shadow.len()];
+        self.accel.occluded(&part.shadow, &mut occluded, &mut scratch, &mut NoProbe);
         part.tally.shadow = part.shadow.len() as u64;
-        part.tally.shadow_hits = blocked.iter().filter(|b| **b).count() as u64;
+        part.tally.shadow_hits = occluded.iter().filter(|b| **b).count() as u64;
         part
     }
 

@@ -135,7 +135,7 @@ pub fn settings(subject: &Subject) -> Vec<Setting> {
 /// A picture's file, for reports.
 pub(crate) fn png(picture: &Picture) -> Vec<u8> {
     let kind = crate::image::FileKind::Png;
-    crate::image::encode(picture, kind, &crate::image::look::as_is(), &Metadata::default()).unwrap_or_default()
+    crate::image::encode(picture, kind, &crate::image::statistics::as_is(), &Metadata::default()).unwrap_or_default()
 }
 
 #[cfg(test)]

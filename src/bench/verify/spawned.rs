@@ -86,12 +86,12 @@ fn spawn(
     let refined = shapes.refine(ray, hit);
     let dir = random.direction();
     let away = Ray { origin: refined.origin(dir), t_min: 0.0, dir, t_max: f32::INFINITY, exclude: hit.prim, sample: 0 };
-    let mut blocked = [false];
-    accel.occluded(&[away], &mut blocked, scratch, &mut NoProbe);
+    let mut occluded = [false];
+    accel.occluded(&[away], &mut occluded, scratch, &mut NoProbe);
     let start = Start::new(shapes, ray, hit.prim, &refined, &away)?;
     let astray = usize::from(start.is_astray(shapes, oracle));
     let mut counts = Spawned { rays: 1, ..Spawned::default() };
-    match (oracle.nearest(&away).is_some(), blocked[0]) {
+    match (oracle.nearest(&away).is_some(), occluded[0]) {
         (true, false) => counts.leaks = 1,
         (false, true) => counts.false_shadows = 1,
         (true, true) => counts.self_hits = astray,

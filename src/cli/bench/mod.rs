@@ -17,8 +17,8 @@ use crate::bench::rays::{self, RaySet};
 use crate::bench::report::{Format, Model, Rays, Report, text};
 use crate::bench::row::Row;
 use crate::bench::sweep::Sweep;
+use crate::huge_pages;
 use crate::load::{Diagnostic, Loaded};
-use crate::pages;
 use crate::render::Filters;
 use crate::render::texture::TextureStore;
 pub(super) use args::BenchArgs;
@@ -40,7 +40,7 @@ struct Bench<'a> {
 pub(super) fn run(args: &BenchArgs) -> Exit {
     let messages = Messages::new(args.messages.into(), args.quiet);
     // Rays are what is measured, many passes of them.
-    pages::allow(Duration::MAX);
+    huge_pages::allow(Duration::MAX);
     let (plan, files) = match (plan(args), files(args)) {
         (Ok(plan), Ok(files)) => (plan, files),
         (Err(wrong), _) | (_, Err(wrong)) => return messages.wrong(wrong),

@@ -21,8 +21,8 @@ use crate::image::diff::{
     Difference, LayerDifference, Looks, Space, compare, greatest, layer_differences, looks, side_by_side,
 };
 use crate::image::draw::heat::{Map, Scale};
-use crate::image::look::{as_is, developed};
 use crate::image::read::{PictureFile, read_picture_file};
+use crate::image::statistics::{as_is, developed};
 use crate::image::{FileKind, ImageError, Layers, Metadata, Output, Picture, ToneMap, encode};
 use crate::load::Diagnostic;
 use crate::number::short;

@@ -3,7 +3,7 @@
 use super::topology::Topology;
 use crate::accel::{AccelChoice, AccelParams};
 use crate::load::paths::FileFault;
-use crate::load::{AnimationFacts, Loaded, WireFacts};
+use crate::load::{AnimationFacts, ExtensionFacts, Loaded, WireFacts};
 use crate::math::{DVec3, Vec3};
 use crate::number::{bytes, grouped, hash, so_many};
 use crate::render::World;
@@ -148,7 +148,7 @@ impl<'a> Report<'a> {
 
     fn names(&self, lines: &mut Lines) {
         let scene = &self.loaded.scene;
-        let extension = |(name, required, supported): &(String, bool, bool)| {
+        let extension = |ExtensionFacts { name, required, supported }: &ExtensionFacts| {
             let required = if *required { ", required" } else { "" };
             format!("{name} ({}{required})", if *supported { "supported" } else { "not supported" })
         };
@@ -222,7 +222,7 @@ impl<'a> Report<'a> {
                 .map(|b| json!({ "name": b.name, "width": b.width, "height": b.height })).collect::<Vec<_>>(),
             "missing": self.missing(),
             "extensions": facts.extensions.iter()
-                .map(|(n, r, s)| json!({ "name": n, "required": r, "supported": s })).collect::<Vec<_>>(),
+                .map(|e| json!({ "name": e.name, "required": e.required, "supported": e.supported })).collect::<Vec<_>>(),
             "scenes": facts.scenes, "scene": facts.scene_index,
             "animations": facts.animations.iter()
                 .map(|a| json!({ "name": a.name, "seconds": a.seconds, "channels": a.channels })).collect::<Vec<_>>(),

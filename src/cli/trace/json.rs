@@ -1,4 +1,4 @@
-//! The story of a ray as JSON; the schema is described in [`super`].
+//! The tree of rays of a sample as JSON; the schema is described in [`super`].
 
 use super::Told;
 use super::words::{in_world, inside, light, object, place};
@@ -6,7 +6,7 @@ use crate::accel::probe::{Extent, NodeId, Test, Visit};
 use crate::accel::{Hit, RayCounts};
 use crate::number::hash;
 use crate::render::Question;
-use crate::render::story::{Class, Event, Query};
+use crate::render::ray_tree::{Class, Event, Query};
 use serde_json::{Map, Value, json};
 
 /// One object.
@@ -23,18 +23,18 @@ pub(super) fn write(told: &Told) -> String {
         "pixel": [told.pixel.0, told.pixel.1],
         "sample": told.sample,
         "samples": settings.samples,
-        "depth": told.story.depth,
+        "depth": told.ray_tree.depth,
         "accel": told.accel.name(),
         "prims": told.world.len(),
-        "radiance": told.story.radiance.to_array(),
-        "through": told.story.through.to_array(),
+        "radiance": told.ray_tree.radiance.to_array(),
+        "through": told.ray_tree.through.to_array(),
         "ray": query(told, 0),
     });
     format!("{value:#}\n")
 }
 
 fn query(told: &Told, i: usize) -> Value {
-    let query = &told.story.queries[i];
+    let query = &told.ray_tree.queries[i];
     let scene = &told.loaded.scene;
     let mut object = Map::new();
     let mut set = |key: &str, value: Value| drop(object.insert(key.into(), value));

@@ -35,7 +35,7 @@ use super::{interrupt, panics, read, viewed};
 use crate::accel::{AccelKind, AccelParams};
 use crate::image::{FileKind, Metadata};
 use crate::load::{Diagnostic, Loaded};
-use crate::render::story::{Story, tell};
+use crate::render::ray_tree::{RayTree, tell};
 use crate::render::texture::TextureStore;
 use crate::render::{Instancing, Job, Settings, View, World};
 pub(super) use args::TraceArgs;
@@ -53,12 +53,12 @@ struct Told<'a> {
     view: &'a str,
     pixel: (u32, u32),
     sample: u32,
-    story: &'a Story,
+    ray_tree: &'a RayTree,
     /// Whether steps are listed for every ray.
     all_steps: bool,
 }
 
-/// Loads the model, traces the ray and prints its story.
+/// Loads the model, traces the ray and prints what became of it.
 pub(super) fn run(args: &TraceArgs) -> Exit {
     let messages = Messages::new(args.model.messages.into(), args.quiet);
     let checked = check(args).and_then(|look| Ok((look, job::params(&args.params, args.accel.kinds())?)));
@@ -118,7 +118,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     let (accel, _) = world.structure_for(settings.fewest_eye_rays(), args.accel, params);
     let textures = TextureStore::new(&loaded.scene);
     let job = Job { scene: &loaded.scene, world: &world, accel: &accel, textures: &textures, view: &view, settings };
-    let story = tell(&job, args.pixel, args.sample).ok_or_else(|| {
+    let ray_tree = tell(&job, args.pixel, args.sample).ok_or_else(|| {
         let text = format!("the picture has no pixel {:?} or no sample {} of it", args.pixel, args.sample);
         messages.wrong(UsageError(text))
     })?;
@@ -132,7 +132,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
         view: &view_phrase,
         pixel: args.pixel,
         sample: args.sample,
-        story: &story,
+        ray_tree: &ray_tree,
         all_steps: args.all_steps,
     };
 
@@ -187,7 +187,7 @@ impl Told<'_> {
 
     /// How far the eye is behind where its ray starts: far ones start theirs just before the scene.
     fn skipped(&self) -> f64 {
-        let Some(ray) = self.story.queries.first().map(|query| query.ray) else { return 0.0 };
+        let Some(ray) = self.ray_tree.queries.first().map(|query| query.ray) else { return 0.0 };
         let View { eye, forward, .. } = self.eye;
         // Along the view: rays of parallel projections, and those through a lens, start beside the eye.
         let distance =
@@ -197,8 +197,8 @@ impl Told<'_> {
     }
 
     fn color(&self) -> String {
-        let [r, g, b] = self.story.radiance.to_array();
-        let through = self.story.through.element_sum() / 3.0;
+        let [r, g, b] = self.ray_tree.radiance.to_array();
+        let through = self.ray_tree.through.element_sum() / 3.0;
         let behind = if through > 0.0 { format!(" and {through} of the background") } else { String::new() };
         format!("{r} {g} {b}{behind}")
     }

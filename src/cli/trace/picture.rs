@@ -10,7 +10,7 @@ use crate::accel::{AccelChoice, AccelKind, AccelParams};
 use crate::image::draw::{Canvas, Color, text_height, text_width};
 use crate::math::{DVec2, DVec3};
 use crate::number::grouped;
-use crate::render::story::{Class, Event, Query};
+use crate::render::ray_tree::{Class, Event, Query};
 use crate::render::view::Lens;
 use crate::render::{Job, Question, Settings, View, render};
 use crate::scene::UpAxis;
@@ -36,7 +36,7 @@ const REFRACTED: Color = [204, 121, 167];
 
 /// Both views and a legend.
 pub(super) fn draw(told: &Told, job: &Job) -> Canvas {
-    let Some(eye) = told.story.queries.first() else { return Canvas::filled(1, 1, PAPER) };
+    let Some(eye) = told.ray_tree.queries.first() else { return Canvas::filled(1, 1, PAPER) };
     // Whatever the ray went through: all structures give the same picture, and this one soon.
     let (accel, _) = told.world.structure(AccelChoice::Kind(AccelKind::DEFAULT), &AccelParams::DEFAULT);
     let job = &Job { accel: &accel, ..*job };
@@ -259,7 +259,7 @@ impl<'a> Stage<'a> {
     /// The rays that came of the eye's, and those of these.
     fn secondary(&self) -> Vec<(Color, [DVec3; 2])> {
         let far = (self.scene.1 - self.scene.0).length();
-        let queries = self.told.story.queries.iter().skip(1);
+        let queries = self.told.ray_tree.queries.iter().skip(1);
         let drawn = |query: &Query| {
             let color = match query.class {
                 Class::Primary => RAY,

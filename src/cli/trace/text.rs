@@ -1,4 +1,4 @@
-//! The story of a ray as text.
+//! The tree of rays of a sample as text.
 
 use super::Told;
 use super::words::{goes_on, in_world, inside, light, object, place};
@@ -6,15 +6,15 @@ use crate::accel::probe::{Extent, NodeId, Outcome, Visit};
 use crate::math::{DVec3, Vec3};
 use crate::number::grouped;
 use crate::render::Question;
-use crate::render::story::{Class, Event, Query};
+use crate::render::ray_tree::{Class, Event, Query};
 use std::fmt::Write;
 
 /// Everything, ray by ray.
 pub(super) fn write(told: &Told) -> String {
     let mut out = format!("{}\n\n", told.title());
     tell(told, 0, 0, &mut out);
-    let rays = told.story.queries.len();
-    let tests: u64 = told.story.queries.iter().map(|q| q.counts.n_it).sum();
+    let rays = told.ray_tree.queries.len();
+    let tests: u64 = told.ray_tree.queries.iter().map(|q| q.counts.n_it).sum();
     let _ =
         writeln!(out, "\n{rays} queries in all, {} ray/prim tests; colour (linear) {}", grouped(tests), told.color());
     out
@@ -22,7 +22,7 @@ pub(super) fn write(told: &Told) -> String {
 
 /// A query, its steps, and what came of it, indented by its depth in the tree.
 fn tell(told: &Told, i: usize, depth: usize, out: &mut String) {
-    let query = &told.story.queries[i];
+    let query = &told.ray_tree.queries[i];
     let margin = "  ".repeat(depth);
     let _ = writeln!(out, "{margin}{}", headline(told, query));
     if i == 0 || told.all_steps {

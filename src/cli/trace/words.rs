@@ -4,12 +4,12 @@ use crate::accel::probe::Extent;
 use crate::accel::{Hit, Ray};
 use crate::load::Loaded;
 use crate::math::{DVec3, Vec3};
-use crate::render::story::Query;
+use crate::render::ray_tree::Query;
 use crate::render::{PrimSource, World};
 use crate::scene::Scene;
 
 /// A surface that a ray hit.
-pub(super) struct Place<'a> {
+pub(super) struct HitSurface<'a> {
     /// Name of the object in the file, or its number.
     pub object: String,
     /// The number of the material.
@@ -25,13 +25,13 @@ pub(super) struct Place<'a> {
 }
 
 /// Where a query's hit lies.
-pub(super) fn place<'a>(loaded: &'a Loaded, world: &World, query: &Query) -> Option<Place<'a>> {
+pub(super) fn place<'a>(loaded: &'a Loaded, world: &World, query: &Query) -> Option<HitSurface<'a>> {
     let scene = &loaded.scene;
     query.hit.is_some().then(|| {
         let refined = world.refine(&query.ray, &query.hit);
         let material_number = world.material(scene, query.hit.prim);
         let material = scene.materials.get(material_number as usize);
-        Place {
+        HitSurface {
             object: object(scene, world, query.hit.prim),
             material_number,
             material: material.map_or("", |m| m.name.as_str()),

@@ -5,11 +5,11 @@
 //! says [`flip`](mod@flip).
 
 pub mod flip;
+mod flip_pictures;
 mod layers;
-mod looks;
 
+pub use flip_pictures::{Looks, PIXELS_PER_DEGREES, looks};
 pub use layers::{LayerDifference, layer_differences};
-pub use looks::{Looks, PIXELS_PER_DEGREES, looks};
 
 use super::{Picture, srgb};
 

@@ -2,7 +2,7 @@
 
 use super::color::linear;
 use super::pairs::Pairs;
-use super::smooth::{Smooth, smooth};
+use super::smoothing_groups::{Smooth, smooth};
 use super::soup::{Corner, NONE, Soup};
 use super::{Face, Geometry};
 use crate::load::Polygons;

@@ -1,7 +1,7 @@
 //! Faces, points and lines -> scene: the way of OBJ files, and of files that hold geometry alone.
 
 use super::Geometry;
-use super::{assemble, strokes, up};
+use super::{assemble, up, wire_statements};
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::mtl;
 use crate::load::paths::Resolver;
@@ -57,7 +57,7 @@ pub(in crate::load) fn finish(
         assemble::as_they_are(&mut geometry, &soup, &placed)
     };
     let (wire_runs, mut wires): (Vec<u32>, Vec<Wires>) =
-        strokes::assemble(&geometry, &soup, &placed).into_iter().unzip();
+        wire_statements::assemble(&geometry, &soup, &placed).into_iter().unzip();
     drop(soup);
     warn_of_faces(&assembled, kind, file, &mut warnings);
     if geometry.faces.is_empty() && assembled.meshes.is_empty() && wires.is_empty() {

@@ -1,21 +1,21 @@
 //! Geometry without a hierarchy -> scene: vertices, faces, points and lines, in runs that share a name and a material.
 //!
-//! The text of an OBJ leaves it ([`obj`](super::obj)), files of other formats hold nothing else ([`plain_mesh`]). It is centred in
-//! `f64` and rounded ([`place`](super::place)), and becomes one mesh and one instance for each run (`assemble`), points and
-//! lines (`strokes`) get a width ([`wires`](super::wires)), materials come from the MTL files or pictures that it names
-//! ([`mtl`](super::mtl), `plain_mesh::pictures`); `finish` is the whole way.
+//! The text of an OBJ leaves it ([`obj`](super::obj)), files of other formats hold nothing else ([`plain_mesh`]). It is
+//! centred in `f64` and rounded ([`place`](super::place)), and becomes one mesh and one instance for each run (`assemble`),
+//! points and lines (`wire_statements`) get a width ([`wires`](super::wires)), materials come from the MTL files or
+//! pictures that it names ([`mtl`](super::mtl), `plain_mesh::pictures`); `finish` is the whole way.
 
 mod assemble;
 pub(super) mod color;
 pub(super) mod finish;
+#[cfg(test)]
+pub(super) mod invariants;
 mod pairs;
 pub(super) mod plain_mesh;
-mod smooth;
-#[cfg(test)]
-pub(super) mod sound;
+mod smoothing_groups;
 mod soup;
-mod strokes;
 pub(super) mod up;
+mod wire_statements;
 
 pub(super) use soup::{Corner, NONE, Soup};
 
@@ -32,9 +32,9 @@ pub(super) struct Geometry {
     /// vertices, and no normals: most scans. [`Self::faces`] and what goes with them are empty then.
     pub triangles: Vec<[u32; 3]>,
     /// Where these stand in the file; empty where the line of each is its number.
-    pub stretches: Vec<FaceSpan>,
+    pub face_spans: Vec<FaceSpan>,
     pub faces: Vec<Face>,
-    pub strokes: Vec<WireStatement>,
+    pub wire_statements: Vec<WireStatement>,
     /// Whether every vertex is a point instead, which has the normal of the same number; coordinates do not count.
     pub is_cloud: bool,
     pub runs: Vec<Run>,
@@ -92,8 +92,8 @@ impl FaceSpan {
 
     /// All faces of some of them.
     pub(super) fn all(some: &[Self]) -> Vec<Face> {
-        let mut faces = Vec::with_capacity(some.iter().map(|stretch| stretch.count as usize).sum());
-        some.iter().for_each(|stretch| faces.extend((0..stretch.count).map(|i| stretch.face(i))));
+        let mut faces = Vec::with_capacity(some.iter().map(|span| span.count as usize).sum());
+        some.iter().for_each(|span| faces.extend((0..span.count).map(|i| span.face(i))));
         faces
     }
 }
@@ -127,12 +127,12 @@ impl Geometry {
         let triangles = std::mem::take(&mut self.triangles);
         let corner = |&position: &u32| Corner { position, uv: NONE, normal: NONE };
         self.soup.corners = triangles.as_flattened().iter().map(corner).collect();
-        let mut stretches = std::mem::take(&mut self.stretches);
-        if stretches.is_empty() {
+        let mut face_spans = std::mem::take(&mut self.face_spans);
+        if face_spans.is_empty() {
             let face = Face { run: 0, smoothing: 0, arity: 3, line: 0, number: 0, first: 0 };
-            stretches.push(FaceSpan { face, count: triangles.len() as u32 });
+            face_spans.push(FaceSpan { face, count: triangles.len() as u32 });
         }
-        self.faces = FaceSpan::all(&stretches);
+        self.faces = FaceSpan::all(&face_spans);
     }
 
     /// Makes every vertex a point; the `i`th has the `i`th normal where there are as many.

@@ -32,7 +32,7 @@ pub(in crate::load) struct Soup {
     pub alphas: Vec<f32>,
     pub corners: Vec<Corner>,
     /// Corners of all points and lines, one statement after another.
-    pub stroke_corners: Vec<Corner>,
+    pub wire_corners: Vec<Corner>,
 }
 
 impl Soup {
@@ -42,7 +42,7 @@ impl Soup {
         /// Corners and positions that one thread looks at at a time.
         const MANY: usize = 1 << 13;
         let used: Vec<AtomicBool> = std::iter::repeat_with(AtomicBool::default).take(self.positions.len()).collect();
-        let of_corners = self.corners.par_iter().chain(&self.stroke_corners).map(|corner| corner.position);
+        let of_corners = self.corners.par_iter().chain(&self.wire_corners).map(|corner| corner.position);
         of_corners.chain(triangles.as_flattened().par_iter().copied()).with_min_len(MANY).for_each(|position| {
             if let Some(used) = used.get(position as usize) {
                 used.store(true, Relaxed);

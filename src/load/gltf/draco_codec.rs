@@ -57,9 +57,9 @@ mod decoder {
     //! What the library decodes, in the types that accessors declare.
 
     use super::{ComponentType, Output, Wanted};
+    use crate::catch_panic::attempt;
     use crate::load::gltf::draco_points::Points;
     use crate::load::gltf::draco_survey::check;
-    use crate::quiet::attempt;
     use draco_oxide_core::attribute::Attribute;
     use draco_oxide_core::mesh::Mesh;
     use draco_oxide_decoder::Err as Failure;

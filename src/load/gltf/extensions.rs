@@ -3,8 +3,8 @@
 use super::codes::Code;
 use super::report::Report;
 use super::tree::Value;
-use crate::load::Diagnostic;
 use crate::load::paths::shorten;
+use crate::load::{Diagnostic, ExtensionFacts};
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -138,19 +138,24 @@ impl Lists {
         Self { used: list("extensionsUsed"), required: list("extensionsRequired") }
     }
 
-    /// Each extension once: name, whether required, whether supported.
-    pub(super) fn facts(&self) -> Vec<(String, bool, bool)> {
+    /// Each extension once.
+    pub(super) fn facts(&self) -> Vec<ExtensionFacts> {
         let required: HashSet<&String> = self.required.iter().collect();
         let mut seen = HashSet::new();
         let each_once = self.used.iter().chain(&self.required).filter(|name| seen.insert(*name));
         let is_supported = |name: &str| SUPPORTED.contains(&name) && is_built(name);
-        each_once.map(|name| (name.clone(), required.contains(name), is_supported(name))).collect()
+        let facts = |name: &String| ExtensionFacts {
+            name: name.clone(),
+            required: required.contains(name),
+            supported: is_supported(name),
+        };
+        each_once.map(facts).collect()
     }
 
     /// Refuses what is required and not understood; names in one warning what is only used and changes the look.
     pub(super) fn check(&self, file: &Path, report: &mut Report) {
         let mut ignored = Vec::new();
-        for (name, required, supported) in self.facts() {
+        for ExtensionFacts { name, required, supported } in self.facts() {
             if supported || HARMLESS.contains(&name.as_str()) {
                 continue;
             }

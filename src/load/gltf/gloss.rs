@@ -3,7 +3,7 @@
 //! Roughness is what gloss is missing to one (KHR_materials_pbrSpecularGlossiness), so a map of one is a map of the
 //! other, made once after decoding: roughness in green and no metal in blue, as metallic-roughness maps have them.
 
-use crate::pages::Paged;
+use crate::huge_pages::Paged;
 use crate::scene::{Bitmap, Pixels};
 
 /// The roughness of a picture in whose alpha gloss is a part of `gloss`, 0 … 1. One texel where there is no alpha.

@@ -59,7 +59,7 @@ pub(super) fn decode(name: &str, bytes: &[u8]) -> Result<Bitmap, String> {
 /// Turns a panic of one of the libraries into a fault of the file.
 #[cfg(feature = "basisu")]
 fn caught<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    crate::quiet::attempt(work).unwrap_or_else(|| Err("it is KTX2, and damaged".into()))
+    crate::catch_panic::attempt(work).unwrap_or_else(|| Err("it is KTX2, and damaged".into()))
 }
 
 #[cfg(not(feature = "basisu"))]

@@ -3,7 +3,7 @@
 use super::options::{Channel, Map};
 use super::parse::{Mtl, Slot};
 use super::pictures::{Alpha, Pictures, Take};
-use crate::load::finder::{Finder, Place, unquote};
+use crate::load::finder::{Finder, FoundPath, unquote};
 use crate::load::limits::{Budget, Limits, OverBudget};
 use crate::load::paths::{FileFault, taken_from};
 use crate::load::texture::{Encoded, Unusable, decode_all};
@@ -127,7 +127,7 @@ impl Textures {
         finder: &mut Finder,
         budget: &mut Budget,
         queue: &mut Queue,
-    ) -> Result<Place, Diagnostic> {
+    ) -> Result<FoundPath, Diagnostic> {
         let place = map.line.to_string();
         let lost = |fault: FileFault| {
             let warning = fault.diagnose(library.file, &place);

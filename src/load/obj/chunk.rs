@@ -46,9 +46,9 @@ pub(super) struct Chunk {
     pub dropped: Vec<[u32; 3]>,
     pub faces: Vec<FaceSpan>,
     /// Points and lines.
-    pub strokes: Vec<WireStatement>,
+    pub wire_statements: Vec<WireStatement>,
     /// Their corners, as [`Self::corners`].
-    pub stroke_corners: Vec<[u32; 3]>,
+    pub wire_corners: Vec<[u32; 3]>,
     pub runs: Vec<Run>,
     /// 0 is the empty one.
     pub names: Vec<String>,
@@ -322,8 +322,8 @@ impl Reader {
             b"usemtl" => self.rename(|run, name| run.material = Some(name), rest),
             b"s" => self.smoothing_group(rest),
             b"mtllib" => self.out.libraries.push((self.line, decode_name(rest))),
-            b"l" => self.stroke(rest, true),
-            b"p" => self.stroke(rest, false),
+            b"l" => self.wire(rest, true),
+            b"p" => self.wire(rest, false),
             // Continued blank lines leave no word.
             b"" => {}
             _ if word.starts_with(b"#") => self.comment(text),
@@ -480,22 +480,22 @@ impl Reader {
     }
 
     /// A `p` or `l` statement; one that cannot be read is counted and left out.
-    fn stroke(&mut self, rest: &[u8], joined: bool) {
-        let first = self.out.stroke_corners.len();
+    fn wire(&mut self, rest: &[u8], joined: bool) {
+        let first = self.out.wire_corners.len();
         for word in words(rest) {
             let Some(corner) = self.corner(word) else {
-                self.out.stroke_corners.truncate(first);
+                self.out.wire_corners.truncate(first);
                 break;
             };
-            self.out.stroke_corners.push(corner);
+            self.out.wire_corners.push(corner);
         }
-        let arity = count(self.out.stroke_corners.len() - first);
+        let arity = count(self.out.wire_corners.len() - first);
         if arity < if joined { 2 } else { 1 } {
-            self.out.stroke_corners.truncate(first);
-            return self.out.odd.strokes.note(self.line, rest);
+            self.out.wire_corners.truncate(first);
+            return self.out.odd.wire_statements.note(self.line, rest);
         }
         let run = self.run();
-        self.out.strokes.push(WireStatement { run, line: self.line, arity, joined });
+        self.out.wire_statements.push(WireStatement { run, line: self.line, arity, joined });
     }
 
     /// `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, or back from the last one with −1. Some programs write 0
@@ -548,7 +548,7 @@ impl Reader {
         let first = count(self.out.corners.len()).saturating_sub(arity);
         let face = Face { run, smoothing: self.out.smoothing, arity, line, number, first };
         match self.out.faces.last_mut() {
-            Some(stretch) if stretch.face(stretch.count) == face => stretch.count += 1,
+            Some(span) if span.face(span.count) == face => span.count += 1,
             _ => self.out.faces.push(FaceSpan { face, count: 1 }),
         }
         self.out.face_count = self.out.face_count.saturating_add(1);

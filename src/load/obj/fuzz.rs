@@ -1,7 +1,7 @@
 //! Texts that nobody wrote: whatever comes in, the loader ends with a scene that holds together or with an error.
 
 use super::*;
-use crate::load::geometry::sound::assert_sound;
+use crate::load::geometry::invariants::assert_sound;
 use crate::load::{Polygons, load_source, mtl};
 use proptest::prelude::*;
 

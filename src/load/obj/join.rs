@@ -46,25 +46,25 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
     let colors = chunks.iter().any(|c| !c.colors.is_empty());
     let colors = if colors { all_colors(&chunks, &begins, counts[0]) } else { painted(&chunks, counts[0]) };
     let (positions, uvs, normals) = vertices(&mut chunks);
-    let stretches = stretches(&chunks, &begins, &runs);
+    let face_spans = face_spans(&chunks, &begins, &runs);
     let is_plain = uvs.is_empty() && normals.is_empty() && colors.is_empty() && table.runs.len() == 1;
-    let plain = if is_plain { triangles(&chunks, &begins, counts[0], &stretches) } else { None };
+    let plain = if is_plain { triangles(&chunks, &begins, counts[0], &face_spans) } else { None };
     let there = There { counts, uvs: &uvs, normals: &normals };
     let (corners, mut faulty) = if plain.is_some() { (Vec::new(), false) } else { corners(&chunks, &begins, &there) };
-    let stroke_corners = strokes(&chunks, &begins, &runs, &there, &mut out);
+    let wire_corners = wire_statements(&chunks, &begins, &runs, &there, &mut out);
     faulty |= chunks.iter().any(|c| c.faulty);
     drop(chunks);
-    let soup = Soup { positions, uvs, normals, colors, alphas: Vec::new(), corners, stroke_corners };
+    let soup = Soup { positions, uvs, normals, colors, alphas: Vec::new(), corners, wire_corners };
     out.geometry = Geometry { soup, names: table.names, runs: table.runs, ..out.geometry };
     match plain {
-        Some(triangles) => (out.geometry.triangles, out.geometry.stretches) = (triangles, stretches),
-        None => out.geometry.faces = FaceSpan::all(&stretches),
+        Some(triangles) => (out.geometry.triangles, out.geometry.face_spans) = (triangles, face_spans),
+        None => out.geometry.faces = FaceSpan::all(&face_spans),
     }
     Ok(Joined { statements: out, faulty })
 }
 
 /// The faces of all runs of lines, as the whole numbers them.
-fn stretches(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<FaceSpan> {
+fn face_spans(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<FaceSpan> {
     let mut all: Vec<FaceSpan> = Vec::with_capacity(chunks.iter().map(|chunk| chunk.faces.len()).sum());
     let mut first = 0;
     for ((chunk, before), runs) in chunks.iter().zip(begins).zip(runs) {
@@ -86,12 +86,12 @@ fn stretches(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<Face
 
 /// The vertices of triangles, of so many, where there is nothing else and nothing more is said of them; `None` too where one is
 /// not there.
-fn triangles(chunks: &[Chunk], begins: &[Before], vertices: u32, stretches: &[FaceSpan]) -> Option<Vec<[u32; 3]>> {
-    let is_plain = |stretch: &FaceSpan| (stretch.face.arity, stretch.face.smoothing) == (3, 0);
-    let of_faces = |chunk: &Chunk| chunk.strokes.is_empty() && chunk.dropped.is_empty() && !chunk.faulty;
+fn triangles(chunks: &[Chunk], begins: &[Before], vertices: u32, face_spans: &[FaceSpan]) -> Option<Vec<[u32; 3]>> {
+    let is_plain = |span: &FaceSpan| (span.face.arity, span.face.smoothing) == (3, 0);
+    let of_faces = |chunk: &Chunk| chunk.wire_statements.is_empty() && chunk.dropped.is_empty() && !chunk.faulty;
     let faces: u64 = chunks.iter().map(|chunk| u64::from(chunk.face_count)).sum();
-    let drawn: u64 = stretches.iter().map(|stretch| u64::from(stretch.count)).sum();
-    if drawn == 0 || drawn != faces || !stretches.iter().all(is_plain) || !chunks.iter().all(of_faces) {
+    let drawn: u64 = face_spans.iter().map(|span| u64::from(span.count)).sum();
+    if drawn == 0 || drawn != faces || !face_spans.iter().all(is_plain) || !chunks.iter().all(of_faces) {
         return None;
     }
     let numbers = chunks.iter().map(|chunk| chunk.corners.vertices_alone()).collect::<Option<Vec<&[u32]>>>()?;
@@ -114,7 +114,7 @@ fn check_sizes(chunks: &[Chunk]) -> Result<(), u64> {
         sum(|c| c.uvs.len()),
         sum(|c| c.normals.len()),
         sum(|c| c.corners.len()),
-        sum(|c| c.stroke_corners.len()),
+        sum(|c| c.wire_corners.len()),
         sum(|c| c.face_count as usize),
     ];
     let largest = sizes.into_iter().max().unwrap_or_default();
@@ -257,22 +257,28 @@ impl There<'_> {
 }
 
 /// Takes over points and lines; their corners. What names a vertex that is not there is counted and left out.
-fn strokes(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>], there: &There, out: &mut Statements) -> Vec<Corner> {
-    let mut corners = Vec::with_capacity(chunks.iter().map(|c| c.stroke_corners.len()).sum());
+fn wire_statements(
+    chunks: &[Chunk],
+    begins: &[Before],
+    runs: &[Vec<u32>],
+    there: &There,
+    out: &mut Statements,
+) -> Vec<Corner> {
+    let mut corners = Vec::with_capacity(chunks.iter().map(|c| c.wire_corners.len()).sum());
     for ((chunk, before), runs) in chunks.iter().zip(begins).zip(runs) {
-        let mut rest = chunk.stroke_corners.as_slice();
-        for stroke in &chunk.strokes {
-            let (numbers, after) = rest.split_at(stroke.arity as usize);
+        let mut rest = chunk.wire_corners.as_slice();
+        for wire in &chunk.wire_statements {
+            let (numbers, after) = rest.split_at(wire.arity as usize);
             rest = after;
             let own = numbers.iter().map(|numbers| there.corner(numbers, before).0);
             let first = corners.len();
             corners.extend(own);
-            let line = stroke.line.saturating_add(before.lines);
+            let line = wire.line.saturating_add(before.lines);
             if corners[first..].iter().any(|corner| corner.position == NONE) {
                 corners.truncate(first);
-                out.odd.strokes.note(line, if stroke.joined { b"l" } else { b"p" });
+                out.odd.wire_statements.note(line, if wire.joined { b"l" } else { b"p" });
             } else {
-                out.geometry.strokes.push(WireStatement { run: runs[stroke.run as usize], line, ..*stroke });
+                out.geometry.wire_statements.push(WireStatement { run: runs[wire.run as usize], line, ..*wire });
             }
         }
     }

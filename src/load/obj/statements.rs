@@ -48,7 +48,7 @@ impl Tally {
 /// Odd things, counted.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Oddities {
-    pub strokes: Tally,
+    pub wire_statements: Tally,
     pub curves: Tally,
     /// Statements that stand for others.
     pub calls: Tally,
@@ -116,9 +116,12 @@ impl Statements {
     /// Whether nothing joins vertices, nor was meant to: then they are points, as scanners write them.
     fn is_cloud(&self) -> bool {
         let odd = &self.odd;
-        let others = [&odd.strokes, &odd.curves, &odd.calls, &odd.few_corners, &odd.absent];
-        let Geometry { faces, triangles, strokes, .. } = &self.geometry;
-        faces.is_empty() && triangles.is_empty() && strokes.is_empty() && others.iter().all(|tally| tally.count == 0)
+        let others = [&odd.wire_statements, &odd.curves, &odd.calls, &odd.few_corners, &odd.absent];
+        let Geometry { faces, triangles, wire_statements, .. } = &self.geometry;
+        faces.is_empty()
+            && triangles.is_empty()
+            && wire_statements.is_empty()
+            && others.iter().all(|tally| tally.count == 0)
     }
 }
 
@@ -155,8 +158,8 @@ fn bytes(chunk: &Chunk) -> u64 {
         2 * (size_of::<Run>() + size_of::<Mesh>() + size_of::<Instance>() + size_of::<Wires>() + 100) as u64;
     let vertices =
         chunk.positions.len() + chunk.uvs.len() + chunk.normals.len() + chunk.colors.len() + chunk.paint.len();
-    let corners = chunk.corners.len() + chunk.stroke_corners.len();
-    let faces = chunk.face_count as usize + chunk.strokes.len();
+    let corners = chunk.corners.len() + chunk.wire_corners.len();
+    let faces = chunk.face_count as usize + chunk.wire_statements.len();
     let texts = chunk.names.iter().chain(chunk.libraries.iter().map(|(_, names)| names));
     let names: u64 = texts.map(|name| NAME + 4 * name.len() as u64).sum();
     // One of its own each may have.
@@ -173,7 +176,7 @@ fn bytes(chunk: &Chunk) -> u64 {
 impl Oddities {
     /// Adds what was met further on, `lines` lines before which there are.
     pub(super) fn append(&mut self, more: Self, lines: u32) {
-        self.strokes.append(more.strokes, lines);
+        self.wire_statements.append(more.wire_statements, lines);
         self.curves.append(more.curves, lines);
         self.calls.append(more.calls, lines);
         self.few_corners.append(more.few_corners, lines);
@@ -196,8 +199,8 @@ impl Oddities {
                 warnings.push(Diagnostic { count: tally.count, ..warning });
             }
         };
-        let stroke = format!("'{}' names no vertices of this file and is left out", self.strokes.word);
-        warn("obj-bad-line", &self.strokes, stroke, "export the model again");
+        let wire = format!("'{}' names no vertices of this file and is left out", self.wire_statements.word);
+        warn("obj-bad-line", &self.wire_statements, wire, "export the model again");
         let curve = format!("free-form geometry ('{}') is not drawn", self.curves.word);
         warn("obj-free-form", &self.curves, curve, "export it as polygons");
         let call = format!("what '{}' stands for is not read", self.calls.word);
@@ -306,7 +309,7 @@ mod tests {
     fn zero_is_no_coordinate_and_no_normal_but_a_fault_as_a_vertex() {
         let s = of(&format!("{TRIANGLE}vt 0 0\nvn 0 0 1\nf 1/0/1 2/1/0 3/0/0\nl 1/0 2"));
         assert_eq!(corners(&s), [[1, 0, 1], [2, 1, 0], [3, 0, 0]]);
-        assert_eq!((s.geometry.strokes.len(), s.odd.zero.count), (1, 5));
+        assert_eq!((s.geometry.wire_statements.len(), s.odd.zero.count), (1, 5));
         let mut warnings = Warnings::default();
         s.odd.warn(Path::new("m.obj"), &mut warnings);
         let told: Vec<String> = warnings.into_vec().iter().map(ToString::to_string).collect();
@@ -349,7 +352,7 @@ mod tests {
     #[test]
     fn curves_are_counted_and_short_faces_dropped() {
         let s = of(&format!("{TRIANGLE}p 1 2 3\nl 1 2 3\nsurf 0 1 0 1 1\nf 1 2\nf\nf 1 2 3\nhello"));
-        assert_eq!((s.odd.strokes.count, s.odd.curves.count), (0, 1));
+        assert_eq!((s.odd.wire_statements.count, s.odd.curves.count), (0, 1));
         assert_eq!((s.odd.few_corners.count, s.odd.unknown.count), (2, 1));
         assert_eq!(s.geometry.faces, [Face { run: 0, smoothing: 0, arity: 3, line: 9, number: 2, first: 0 }]);
     }
@@ -367,12 +370,12 @@ mod tests {
     fn points_and_lines_name_vertices_like_faces_and_bad_ones_are_left_out() {
         let text = format!("l 1/1 2 3 # side\n{TRIANGLE}vt 0 0\np -1 1\nl 1\nl 1 9\np x\np\nl 1 -4\nf 1 2 3\nl 2 3");
         let s = of(&text);
-        let stroke = |line, arity, joined| WireStatement { run: 0, line, arity, joined };
-        assert_eq!(s.geometry.strokes, [stroke(1, 3, true), stroke(6, 2, false), stroke(13, 2, true)]);
-        let numbers: Vec<_> = s.geometry.soup.stroke_corners.iter().map(|c| (c.position, c.uv == NONE)).collect();
+        let wire = |line, arity, joined| WireStatement { run: 0, line, arity, joined };
+        assert_eq!(s.geometry.wire_statements, [wire(1, 3, true), wire(6, 2, false), wire(13, 2, true)]);
+        let numbers: Vec<_> = s.geometry.soup.wire_corners.iter().map(|c| (c.position, c.uv == NONE)).collect();
         let at = |i| (i, true);
         assert_eq!(numbers, [(0, false), at(1), at(2), at(2), at(0), at(1), at(2)]);
-        assert_eq!(s.odd.strokes.count, 5);
+        assert_eq!(s.odd.wire_statements.count, 5);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::tests::painted::roof;
 use super::tests::{FORMATS, of, square};
-use crate::load::geometry::sound::assert_sound;
+use crate::load::geometry::invariants::assert_sound;
 use crate::load::{LoadOptions, Polygons};
 use proptest::prelude::*;
 

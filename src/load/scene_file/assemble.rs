@@ -31,7 +31,7 @@ pub(super) fn assemble(
     let known = HashMap::new();
     let mut assembly = Assembly { faults, source, options, budget, resolver, scene, facts, warnings, known };
     if let Some(surrounding) = panorama {
-        assembly.look_around(surrounding)?;
+        assembly.set_environment(surrounding)?;
     }
     for model in &models {
         assembly.add(model)?;
@@ -82,7 +82,7 @@ struct Known {
 
 impl Assembly<'_> {
     /// Reads the picture of what surrounds the scene.
-    fn look_around(&mut self, Surrounding { file, at, rotation }: Surrounding) -> Result<(), LoadError> {
+    fn set_environment(&mut self, Surrounding { file, at, rotation }: Surrounding) -> Result<(), LoadError> {
         let path = &self.source.path;
         let over = |over| Diagnostic::over_budget(path, over);
         // The file itself is needed no longer than until it is decoded.

@@ -2,7 +2,7 @@
 
 use super::tests::{binary, of, text};
 use crate::load::LoadOptions;
-use crate::load::geometry::sound::assert_sound;
+use crate::load::geometry::invariants::assert_sound;
 use proptest::prelude::*;
 
 proptest! {

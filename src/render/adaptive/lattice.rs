@@ -2,7 +2,7 @@
 
 use crate::render::frame::{Frame, on_lens, pixel_key};
 use crate::render::layers::FirstSurface;
-use crate::render::primary_rays::Place;
+use crate::render::primary_rays::CameraSample;
 use crate::render::sampling::Adaptive;
 use crate::render::whitted::Sample;
 use std::collections::HashMap;
@@ -136,13 +136,13 @@ impl Lattice {
     }
 
     /// The place of a point in the picture, exactly; a ray depends on nothing else.
-    pub(super) fn place(frame: &Frame, pixel: u32, (x, y): Step) -> Place {
+    pub(super) fn place(frame: &Frame, pixel: u32, (x, y): Step) -> CameraSample {
         /// Steps in a pixel that no lattice exceeds.
         const FINEST: u32 = 2 << Adaptive::MAX_LEVELS;
         let finest = |steps: u32| steps.wrapping_mul(FINEST / pixel);
         let key = pixel_key(frame.settings.seed, (finest(x), finest(y)));
         let lens = on_lens(frame.settings.lens, key, 0);
-        Place { x: f64::from(x) / f64::from(pixel), y: f64::from(y) / f64::from(pixel), lens }
+        CameraSample { x: f64::from(x) / f64::from(pixel), y: f64::from(y) / f64::from(pixel), lens }
     }
 }
 

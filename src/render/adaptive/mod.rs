@@ -137,7 +137,7 @@ impl Band {
         let (first, last) = (tiles[0], tiles[tiles.len() - 1]);
         for found in above {
             let along = |plot: &&mut Plot| (plot.tile.x0 * pixel..=plot.tile.x1 * pixel).contains(&found.at.0);
-            plots[..columns].iter_mut().filter(along).for_each(|plot| plot.hear(found, layers));
+            plots[..columns].iter_mut().filter(along).for_each(|plot| plot.take_border_point(found, layers));
         }
         // The last row may be lower, never the first but alone.
         let side = (first.x1 - first.x0).max(first.y1 - first.y0) * pixel;
@@ -188,7 +188,7 @@ impl Band {
                 }
                 let Some(found) = self.plots[from].lattice.found(at) else { continue };
                 for to in self.plots_at(at).filter(|&to| to != from) {
-                    self.plots[to].hear(&found, layers);
+                    self.plots[to].take_border_point(&found, layers);
                 }
             }
         }

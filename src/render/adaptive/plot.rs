@@ -126,7 +126,7 @@ impl Plot {
         for points in points.chunks(TOGETHER) {
             tracer.reset(points.len(), frame.settings.layers, &frame.media);
             let eye = frame.eye(tracer.center());
-            tracer.eyes.send(&eye, points.iter().map(|point| Lattice::place(frame, pixel, point.at)));
+            tracer.primary_rays.send(&eye, points.iter().map(|point| Lattice::place(frame, pixel, point.at)));
             if !tracer.trace() {
                 return None;
             }
@@ -140,7 +140,7 @@ impl Plot {
     }
 
     /// Takes what was found at a point of the border of this tile.
-    pub(super) fn hear(&mut self, found: &Found, layers: bool) {
+    pub(super) fn take_border_point(&mut self, found: &Found, layers: bool) {
         let number = self.lattice.number(found.at);
         self.lattice.store(number, found.sample, layers.then_some(found.first));
         self.fresh.push(Point { at: found.at, number });

@@ -159,7 +159,7 @@ impl<'a> AlphaVoids<'a> {
     }
 
     /// What rays with these cones around them find.
-    pub(super) fn before<'r>(&'r self, rays: &'r [Ray], cones: Cones<'r>) -> AlphaFilter<'r, 'a> {
+    pub(super) fn filter<'r>(&'r self, rays: &'r [Ray], cones: Cones<'r>) -> AlphaFilter<'r, 'a> {
         AlphaFilter { alpha_voids: self, rays, cones }
     }
 

@@ -191,11 +191,11 @@ fn rays_that_are_asked_together_are_told_what_each_is_told_alone() {
         let rays: Vec<(Ray, [f32; 2])> = (0..40).map(|_| toward(&mut random, world.triangle(prim), prim)).collect();
         let (rays, cones): (Vec<Ray>, Vec<[f32; 2]>) = rays.into_iter().unzip();
         let [widths, spreads] = [0, 1].map(|k| cones.iter().map(|cone| cone[k]).collect::<Vec<f32>>());
-        let before = alpha_voids.before(&rays, Cones::PrimaryRays([&widths, &spreads]));
+        let filter = alpha_voids.filter(&rays, Cones::PrimaryRays([&widths, &spreads]));
         let mask = (0..32).filter(|_| random.below(3) != 0).fold(0, |mask, ray| mask | 1 << ray);
-        let alone = (0..32).filter(|&ray| mask >> ray & 1 == 1 && before.rejects(8 + ray, prim));
+        let alone = (0..32).filter(|&ray| mask >> ray & 1 == 1 && filter.rejects(8 + ray, prim));
         let alone = alone.fold(0, |mask, ray| mask | 1 << ray);
-        assert_eq!(before.rejects_of(8, mask, prim), alone, "{:?}", scene.materials[prim as usize]);
+        assert_eq!(filter.rejects_of(8, mask, prim), alone, "{:?}", scene.materials[prim as usize]);
         passed += alone.count_ones();
     }
     assert!(passed > 1000, "{passed}");

@@ -65,8 +65,8 @@ const BEFORE_LIGHT: f32 = 1.0 - 4.0 * f32::EPSILON;
 impl Incident {
     /// Direction and end of a shadow ray from `origin`.
     #[inline(always)]
-    pub(crate) fn way(&self, origin: Vec3) -> (Vec3, f32) {
-        way(origin, self.to_light, self.position)
+    pub(crate) fn shadow_segment(&self, origin: Vec3) -> (Vec3, f32) {
+        shadow_segment(origin, self.to_light, self.position)
     }
 
     /// Radiance of a white matt surface that faces the light: the founding texts' I.
@@ -84,7 +84,7 @@ impl Incident {
 
 /// Direction and end of a shadow ray from `origin` to a light in this direction, at `position` if it is anywhere.
 #[inline(always)]
-pub(crate) fn way(origin: Vec3, to_light: Vec3, position: Option<Vec3>) -> (Vec3, f32) {
+pub(crate) fn shadow_segment(origin: Vec3, to_light: Vec3, position: Option<Vec3>) -> (Vec3, f32) {
     match position {
         Some(position) => (position - origin, BEFORE_LIGHT),
         None => (to_light, f32::INFINITY),

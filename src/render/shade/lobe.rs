@@ -55,8 +55,8 @@ impl Lobe {
     pub(crate) fn kept(&self, view: Vec3, to: Vec3) -> f32 {
         let (n_v, n_l) = (self.normal.dot(view).max(0.0), self.normal.dot(to).abs());
         let (wide_v, wide_l) = (self.length(view), self.length(to));
-        let whole = n_l * wide_v + n_v * wide_l;
-        if whole > 0.0 { n_l * (n_v + wide_v) / whole } else { 0.0 }
+        let total = n_l * wide_v + n_v * wide_l;
+        if total > 0.0 { n_l * (n_v + wide_v) / total } else { 0.0 }
     }
 
     /// [`Self::kept`], and 0 for light from below the surface.

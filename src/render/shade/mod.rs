@@ -20,7 +20,7 @@ pub(crate) use anisotropy::AnisotropicLobe;
 pub(crate) use coat::CoatLobe;
 pub(crate) use facets::{AlbedoRow, albedo_of_each, mean_albedo};
 pub(crate) use highlight::is_narrow;
-pub(crate) use light::{Incident, LocalLight, way};
+pub(crate) use light::{Incident, LocalLight, shadow_segment};
 pub(crate) use lobe::{Lobe, pattern};
 pub(crate) use metal_rough::{EnvironmentTerms, MetalRoughBsdf, MetalRoughInputs, above, open};
 pub(crate) use phong::{PhongBsdf, PhongInputs};
@@ -261,11 +261,11 @@ impl Bsdf {
                 Model::MetalRough(MetalRoughBsdf::new(m, base, occlusion(material, shade), reader))
             }
         };
-        Self::bare(model, emission, true)
+        Self::base_layer(model, emission, true)
     }
 
     /// A surface of this model without anything over it.
-    pub(crate) fn bare(model: Model, emission: Vec3, outside: bool) -> Self {
+    pub(crate) fn base_layer(model: Model, emission: Vec3, outside: bool) -> Self {
         Self { outside, emission, model, anisotropy: None, sheen: None, coat: None }
     }
 

@@ -12,8 +12,8 @@ use super::painted::Painted;
 use crate::math::bounds::offset_origin;
 use crate::math::simd::{Kernel, Level, Simd};
 use crate::math::{Vec3, Vec4};
-use crate::render::absorption::Absorption;
 use crate::render::media::MediaTable;
+use crate::render::media::absorption::Absorption;
 use crate::render::patch::smooth_normal;
 use crate::render::shade::{Bsdf, ShadingFrame};
 use crate::render::shade_hits::TracedRays;
@@ -74,7 +74,7 @@ pub(crate) struct ShadingBatch {
     pub(super) lit: Lit,
     pub(super) drawn: Drawn,
     /// The whole BSDF of each point, where more changes it than columns know; else empty.
-    pub(super) whole: Vec<Bsdf>,
+    pub(super) point_bsdfs: Vec<Bsdf>,
     /// What lies over each point, where that is all there is more; kept from one batch to the next.
     pub(super) overlays: Option<Box<Overlays>>,
 }
@@ -138,7 +138,7 @@ impl Default for ShadingBatch {
             surroundings: Surroundings::default(),
             lit: Lit::default(),
             drawn: Drawn::default(),
-            whole: Vec::new(),
+            point_bsdfs: Vec::new(),
             overlays: None,
         }
     }
@@ -159,7 +159,7 @@ impl ShadingBatch {
             (*at, *sample) = (*ray, *ray);
         }
         self.weights = None;
-        self.whole.clear();
+        self.point_bsdfs.clear();
         self.overlays.iter_mut().for_each(|overlays| overlays.clear());
         if traced.has_weights() {
             let weights = self.weights.insert(EMPTY);
@@ -168,7 +168,11 @@ impl ShadingBatch {
                 let (ray, path, hit) = (&traced.rays()[at], &traced.path(at), &traced.hits()[at]);
                 self.samples[i] = ray.sample;
                 let absorbs = absorption.is_some();
-                put(weights, i, if absorbs { absorption.lessened(media, ray, path, hit).weight } else { path.weight });
+                put(
+                    weights,
+                    i,
+                    if absorbs { absorption.attenuated(media, ray, path, hit).weight } else { path.weight },
+                );
             }
         }
         self.level.run(Gather { given: &mut self.given, hit: &hit[..self.count], sorted, traced, smooth });
@@ -383,7 +387,7 @@ impl Found {
             return;
         }
         for i in 0..points.min(POINTS) {
-            let normal = facing(get(&self.normal, i), get(&self.view, i));
+            let normal = facing(get(&self.normal, i), get(&self.geometric, i), get(&self.view, i));
             put(&mut self.normal, i, normal);
             if self.curved[i] == 1 {
                 put(&mut self.horizon, i, normal);
@@ -443,8 +447,8 @@ mod tests {
         batch.draw((0..61).map(|i| (i, SampleSet::Part { key: mix(7, i as u32), first: 3 * i as u32 }, 3)));
         let place = (size > 0.0).then_some(1);
         let studio = Scene { environment: Environment::Studio, ..Scene::default() };
-        batch.look_around((&bsdf, false), &Sky::new(&studio), Vec3::ONE);
-        batch.shine((&bsdf, false, false), &LocalLight::new(&light, DVec3::ZERO), place);
+        batch.shade_environment((&bsdf, false), &Sky::new(&studio), Vec3::ONE);
+        batch.shade_light((&bsdf, false, false), &LocalLight::new(&light, DVec3::ZERO), place);
         let point = |i: usize| {
             let (f, l) = (&batch.found, &batch.lit);
             let around = &batch.surroundings.radiance;

@@ -85,15 +85,15 @@ impl ShadingBatch {
 
     /// Finds how far a surface bends where cones meet it, and how wide highlights must be, unless that is found when points are
     /// completed; `placement` where the mesh has normals of its own.
-    pub(crate) fn bend(&mut self, context: &Context, common: &MaterialConstants, placement: Option<&Placement>) {
-        let bsdf = &common.bsdf;
+    pub(crate) fn bend(&mut self, context: &Context, constants: &MaterialConstants, placement: Option<&Placement>) {
+        let bsdf = &constants.bsdf;
         let Self { cones, painted, given, found, .. } = self;
         let (points, reach) = (padded(self.count), context.highlight_reach);
         match placement {
             Some(placement) => self.level.run(Bend { given, found, cones, points, placement }),
             None => cones.bend.fill(0.0),
         }
-        if !context.lights.is_empty() && !common.is_completed() {
+        if !context.lights.is_empty() && !constants.is_completed() {
             self.level.run(WidenHighlights { painted, cones, points, bsdf, reach });
         }
     }

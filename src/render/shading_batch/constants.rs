@@ -15,14 +15,14 @@ pub(crate) struct MaterialConstants {
     /// Whether backs of faces are passed.
     pub one_sided: bool,
     /// How much is seen of it where neither maps nor vertices say.
-    pub covered: f32,
+    pub coverage: f32,
     /// Whether maps change it from point to point.
     pub mapped: bool,
     /// Those maps and the colours of vertices, where they can be read side by side.
     pub material_maps: Option<MaterialMaps>,
     /// Whether cones and how they bend must be known: it may mirror, where rays bounce, or show lights as narrow highlights, or
     /// has lobes that may.
-    pub shiny: bool,
+    pub needs_cones: bool,
     /// Where light enters it, which rays follow.
     pub glass: Option<Glass>,
     /// What each point has over it, or reads for itself.
@@ -81,9 +81,9 @@ impl MaterialConstants {
         let smooth = metal_rough.is_some_and(|m| m.metal_rough_map.is_some());
         Some(Self {
             material: number,
-            shiny: glass || lobes.is_some() || smooth || bsdf.has_narrow_highlight() || bounces && mirrors,
+            needs_cones: glass || lobes.is_some() || smooth || bsdf.has_narrow_highlight() || bounces && mirrors,
             one_sided: !material.double_sided && !glass,
-            covered: material.alpha_mode.covers(material.opacity),
+            coverage: material.alpha_mode.covers(material.opacity),
             mapped: material.textures().next().is_some(),
             material_maps: MaterialMaps::of(material, store),
             glass: glass.then(|| Glass::of(material, &bsdf)),

@@ -54,7 +54,7 @@ impl Default for Surroundings {
 impl ShadingBatch {
     /// Finds what each point of a surface of `bsdf` shows of `sky` and of light from everywhere; backs of what `has_inside` are
     /// seen from inside.
-    pub(crate) fn look_around(&mut self, (bsdf, has_inside): (&Bsdf, bool), sky: &Sky, ambient: Vec3) {
+    pub(crate) fn shade_environment(&mut self, (bsdf, has_inside): (&Bsdf, bool), sky: &Sky, ambient: Vec3) {
         let (found, painted, to, points) = (&self.found, &self.painted, &mut self.surroundings, padded(self.count));
         let overlays = self.overlays.as_deref_mut().filter(|over| over.any());
         self.level.run(Look { found, painted, overlays, to, points, bsdf, has_inside, sky, ambient });

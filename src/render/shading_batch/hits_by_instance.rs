@@ -116,7 +116,7 @@ impl Face {
         let (scene, world) = (context.scene, context.world);
         let PrimSource::Triangle { instance, triangle: in_mesh } = world.source(prim) else { return None };
         let mesh = &scene.meshes[scene.instances[instance as usize].mesh as usize];
-        let common = context.common[mesh.material as usize].as_ref()?;
+        let constants = context.material_constants[mesh.material as usize].as_ref()?;
         let corners = world.triangle(prim);
         let plane = TrianglePlane::of(&corners);
         let winding = plane.flat.unit();
@@ -132,8 +132,8 @@ impl Face {
             Some([normal(a)?, normal(b)?, normal(c)?])
         };
         let numbers = FaceNumbers::new(prim, &plane, outward, normals);
-        let material_maps = common.material_maps.as_ref().filter(|material_maps| material_maps.covers(mesh));
-        if material_maps.is_none() && !common.shiny {
+        let material_maps = constants.material_maps.as_ref().filter(|material_maps| material_maps.covers(mesh));
+        if material_maps.is_none() && !constants.needs_cones {
             return Some(Self { numbers, instance, skin: NONE });
         }
         let skin = u32::try_from(skins.len()).unwrap_or(NONE);

@@ -9,10 +9,10 @@ use super::painted::Painted;
 use crate::accel::Ray;
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Simd};
-use crate::render::curve::STEEP;
 use crate::render::media::Media;
-use crate::render::shade::{Bsdf, Incident, LocalLight, Model, PhongBsdf, terminator, way};
+use crate::render::shade::{Bsdf, Incident, LocalLight, Model, PhongBsdf, shadow_segment, terminator};
 use crate::render::shade_hits::TracedRays;
+use crate::render::shadow::curve::STEEP;
 use crate::render::shadow::{Bound, ShadowQueue};
 
 /// Light whose shadow ray starts on the triangle.
@@ -53,24 +53,25 @@ impl Default for Lit {
 
 impl ShadingBatch {
     /// Finds what `light` does at each point of a surface of `bsdf`, on which highlights may be narrow if it is
-    /// `shiny`; backs of what `has_inside`, which is shiny, are seen from inside. Of an area light it is the `place`th
-    /// of those that each point has drawn.
-    pub(crate) fn shine(
+    /// `needs_cones`; backs of what `has_inside`, which is needs_cones, are seen from inside. Of an area light it is the
+    /// `place`th of those that each point has drawn.
+    pub(crate) fn shade_light(
         &mut self,
-        (bsdf, shiny, has_inside): (&Bsdf, bool, bool),
+        (bsdf, needs_cones, has_inside): (&Bsdf, bool, bool),
         light: &LocalLight,
         place: Option<u32>,
     ) {
         let (found, lit, points) = (&self.found, &mut self.lit, padded(self.count));
-        let (painted, whole) = (&self.painted, &self.whole);
+        let (painted, point_bsdfs) = (&self.painted, &self.point_bsdfs);
         let overlays = self.overlays.as_deref().filter(|over| over.any());
-        let cones = shiny.then_some(&self.cones);
+        let cones = needs_cones.then_some(&self.cones);
         let drawn = place.map(|place| (&mut self.drawn, place));
-        let shine = Shine { found, lit, points, bsdf, painted, whole, overlays, cones, has_inside, light, drawn };
+        let shade_light =
+            DirectLight { found, lit, points, bsdf, painted, point_bsdfs, overlays, cones, has_inside, light, drawn };
         if place.is_some() {
-            self.level.run(FromArea(shine))
+            self.level.run(FromArea(shade_light))
         } else {
-            self.level.run(FromPoint(shine))
+            self.level.run(FromPoint(shade_light))
         }
         if let Some(weights) = &self.weights {
             self.level.run(Weigh { weights, radiance: &mut self.lit.radiance, points });
@@ -90,12 +91,12 @@ impl ShadingBatch {
     }
 
     /// The points that it shines on: the sample of each, and what it shows.
-    pub(crate) fn shone(&self) -> impl Iterator<Item = (u32, Vec3)> {
+    pub(crate) fn lit_samples(&self) -> impl Iterator<Item = (u32, Vec3)> {
         self.lit_as(|seen| seen != 0).map(|(i, radiance)| (self.samples[i], radiance))
     }
 
     /// The lit points whose shadow rays [`Self::send`] does not send: their numbers, and what they show.
-    pub(crate) fn grazed(&self) -> impl Iterator<Item = (usize, Vec3)> {
+    pub(crate) fn grazing_points(&self) -> impl Iterator<Item = (usize, Vec3)> {
         let any = self.lit.seen[..padded(self.count)].iter().fold(0, |all, seen| all | seen) & GRAZING != 0;
         self.lit_as(move |seen| any && seen == GRAZING)
     }
@@ -189,14 +190,14 @@ impl Kernel for Send<'_> {
 }
 
 /// What one light does at points.
-struct Shine<'a> {
+struct DirectLight<'a> {
     found: &'a Found,
     lit: &'a mut Lit,
     points: usize,
     bsdf: &'a Bsdf,
     painted: &'a Painted,
     /// What points are made of that more changes than columns know.
-    whole: &'a [Bsdf],
+    point_bsdfs: &'a [Bsdf],
     /// What lies over points.
     overlays: Option<&'a Overlays>,
     /// Where highlights may be narrow.
@@ -208,7 +209,7 @@ struct Shine<'a> {
 }
 
 /// Of a light without extent.
-struct FromPoint<'a>(Shine<'a>);
+struct FromPoint<'a>(DirectLight<'a>);
 
 impl Kernel for FromPoint<'_> {
     type Output = ();
@@ -220,7 +221,7 @@ impl Kernel for FromPoint<'_> {
 }
 
 /// Of an area light: a kernel of its own, which leaves the other one its lanes.
-struct FromArea<'a>(Shine<'a>);
+struct FromArea<'a>(DirectLight<'a>);
 
 impl Kernel for FromArea<'_> {
     type Output = ();
@@ -231,10 +232,11 @@ impl Kernel for FromArea<'_> {
     }
 }
 
-impl Shine<'_> {
+impl DirectLight<'_> {
     #[inline(always)]
     fn find<const AREA: bool>(self) {
-        let Self { found, lit, points, bsdf, painted, whole, overlays, cones, has_inside, light, mut drawn } = self;
+        let Self { found, lit, points, bsdf, painted, point_bsdfs, overlays, cones, has_inside, light, mut drawn } =
+            self;
         let (points, light) = (points.min(POINTS), *light);
         let in_lux = matches!(bsdf.model, Model::MetalRough(_));
         debug_assert_eq!(AREA, drawn.is_some());
@@ -251,7 +253,7 @@ impl Shine<'_> {
         }
         // The model is chosen outside the loop, which then is a formula.
         match &bsdf.model {
-            _ if !whole.is_empty() => reflect_with_lobes(found, lit, whole),
+            _ if !point_bsdfs.is_empty() => reflect_with_lobes(found, lit, point_bsdfs),
             Model::Unlit(_) => lit.seen.fill(0),
             Model::Phong(m) if painted.any => {
                 let m = *m;
@@ -378,8 +380,8 @@ fn keep_all(found: &Found, lit: &mut Lit, points: usize) {
 }
 
 /// What points with more lobes reflect of the light that arrives, and what they let through.
-fn reflect_with_lobes(found: &Found, lit: &mut Lit, whole: &[Bsdf]) {
-    for (i, bsdf) in whole.iter().enumerate().take(POINTS) {
+fn reflect_with_lobes(found: &Found, lit: &mut Lit, point_bsdfs: &[Bsdf]) {
+    for (i, bsdf) in point_bsdfs.iter().enumerate().take(POINTS) {
         let (horizon, normal, view) = (get(&found.horizon, i), get(&found.normal, i), get(&found.view, i));
         let (to_light, light) = (get(&lit.to_light, i), get(&lit.light, i));
         let counts = (lit.seen[i] != 0) & (found.certain[i] == 1);
@@ -391,7 +393,7 @@ fn reflect_with_lobes(found: &Found, lit: &mut Lit, whole: &[Bsdf]) {
         };
         keep(found, lit, i, (radiance, counts), above);
     }
-    lit.seen[whole.len().min(POINTS)..].fill(0);
+    lit.seen[point_bsdfs.len().min(POINTS)..].fill(0);
 }
 
 /// What the points reflect of the light that arrives.
@@ -413,7 +415,7 @@ fn start(found: &Found, lit: &mut Lit, points: usize, light: impl Fn(usize) -> O
     for i in 0..points.min(POINTS) {
         let (geometric, to_light) = (get(&found.geometric, i), get(&lit.to_light, i));
         let origin = leave(found, i, to_light);
-        let (dir, end) = way(origin, to_light, light(i));
+        let (dir, end) = shadow_segment(origin, to_light, light(i));
         put(&mut lit.origin, i, origin);
         put(&mut lit.dir, i, dir);
         lit.end[i] = end;

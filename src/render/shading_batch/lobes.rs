@@ -27,16 +27,16 @@ impl ShadingBatch {
         context: &Context,
         traced: TracedRays,
         placed: PlacedMesh,
-        common: &MaterialConstants,
+        constants: &MaterialConstants,
     ) {
         let metal_rough = context.scene.materials[placed.mesh.material as usize].metal_rough();
-        let (Some(m), Some(lobes)) = (metal_rough, common.lobes.filter(|lobes| !lobes.are_overlays)) else { return };
-        let mut whole = std::mem::take(&mut self.whole);
-        self.each_lobe_frame(context, traced, placed, (common, lobes), |i, on, reader| {
-            let outside = self.found.front[i] == 1 || !common.has_inside();
-            let bare = self.bare(i, &common.bsdf, outside);
-            let Some(on) = on else { return whole.push(bare) };
-            let below = if lobes.reads_reflectance { bare.tinted(m, reader) } else { bare };
+        let (Some(m), Some(lobes)) = (metal_rough, constants.lobes.filter(|lobes| !lobes.are_overlays)) else { return };
+        let mut point_bsdfs = std::mem::take(&mut self.point_bsdfs);
+        self.each_lobe_frame(context, traced, placed, (constants, lobes), |i, on, reader| {
+            let outside = self.found.front[i] == 1 || !constants.has_inside();
+            let base_bsdf = self.base_bsdf(i, &constants.bsdf, outside);
+            let Some(on) = on else { return point_bsdfs.push(base_bsdf) };
+            let below = if lobes.reads_reflectance { base_bsdf.tinted(m, reader) } else { base_bsdf };
             let below = below.thinned(m, reader);
             let mut bsdf = if outside { below.with_lobes(m, on, reader) } else { below };
             let scattered = traced.path(self.rays[i] as usize).scattered;
@@ -44,9 +44,9 @@ impl ShadingBatch {
                 bsdf.blur(scattered);
             }
             self.widen_highlights(i, context, m, &mut bsdf, on.patch);
-            whole.push(bsdf);
+            point_bsdfs.push(bsdf);
         });
-        self.whole = whole;
+        self.point_bsdfs = point_bsdfs;
     }
 
     /// Tells of each point what its lobes lie on, or nothing where the tracer must look itself, with what reads their maps.
@@ -55,10 +55,10 @@ impl ShadingBatch {
         context: &Context,
         traced: TracedRays,
         PlacedMesh { mesh, placement }: PlacedMesh,
-        (common, lobes): (&MaterialConstants, Lobes),
+        (constants, lobes): (&MaterialConstants, Lobes),
         mut tell: impl FnMut(usize, Option<&LobeFrame>, &Reader),
     ) {
-        let side_by_side = common
+        let side_by_side = constants
             .material_maps
             .as_ref()
             .filter(|material_maps| material_maps.covers(mesh))
@@ -91,16 +91,17 @@ impl ShadingBatch {
     }
 
     /// What point `i` is made of with all its lobes, if it has more than one.
-    pub(crate) fn whole(&self, i: usize) -> Option<&Bsdf> {
-        self.whole.get(i)
+    pub(crate) fn point_bsdf(&self, i: usize) -> Option<&Bsdf> {
+        self.point_bsdfs.get(i)
     }
 
     /// What lobes lie on at point `i` of a patch of a mesh, with `placement` where it has normals of its own.
     fn lobe_frame<'a>(&self, i: usize, placement: Option<&Placement>, patch: Option<&'a Patch<'a>>) -> LobeFrame<'a> {
         let own = placement.map_or(self.given.faces.outward(i), |placement| self.given.own_normal(placement, i));
-        let side = side_of(own, get(&self.found.geometric, i));
+        let geometric = get(&self.found.geometric, i);
+        let side = side_of(own, geometric);
         let (normal, view) = (get(&self.found.normal, i), get(&self.found.view, i));
-        LobeFrame { patch, smooth: own * side, side, normal, view }
+        LobeFrame { patch, smooth: own * side, side, geometric, normal, view }
     }
 
     /// Widens highlights at point `i` so far that they are met by rays.

@@ -416,7 +416,7 @@ fn spread(
 #[inline(always)]
 fn inputs(painted: &mut Painted, i: usize, (material, vertex): (&Material, Vec4), texel: impl Fn(Slot) -> Vec4) {
     let base = base_color(material, texel(Slot::Base), texel(Slot::Opacity).x, vertex);
-    painted.covered[i] = material.alpha_mode.covers(base.w);
+    painted.coverage[i] = material.alpha_mode.covers(base.w);
     let base = base.truncate();
     painted.put_emission(i, material.emission * texel(Slot::Emission).truncate());
     painted.put_normal_texel(i, texel(Slot::Normal).truncate());
@@ -480,8 +480,9 @@ impl Kernel for TurnNormals<'_> {
             put(&mut turns.turned, i, turned);
         }
         for i in 0..points.min(POINTS) {
-            let side = side_of(get(&turns.own, i), get(&found.geometric, i));
-            put(&mut found.normal, i, facing(get(&turns.turned, i) * side, get(&found.view, i)));
+            let geometric = get(&found.geometric, i);
+            let side = side_of(get(&turns.own, i), geometric);
+            put(&mut found.normal, i, facing(get(&turns.turned, i) * side, geometric, get(&found.view, i)));
             // Without a tangent it takes the coordinates around.
             found.certain[i] &= u32::from(turns.tangent[0][i].is_finite());
         }

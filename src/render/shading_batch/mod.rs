@@ -12,28 +12,28 @@
 //! `f64`, points whose mesh gives no tangent, and glass from which no ray goes on.
 
 mod area_lights;
+mod batch_point;
 mod columns;
 mod cones;
 mod constants;
 mod environment;
 mod faces;
-mod ground;
 mod hits_by_instance;
 mod lit;
 mod lobes;
 mod material_maps;
 mod overlays;
 mod painted;
-mod through;
+mod pass_through;
 
 use super::world::Placement;
 use crate::scene::Mesh;
 
+pub(crate) use batch_point::BatchPoint;
 pub(crate) use columns::{POINTS, ShadingBatch};
 pub(crate) use constants::MaterialConstants;
-pub(crate) use ground::BatchPoint;
 pub(crate) use hits_by_instance::HitsByInstance;
-pub(crate) use through::Passed;
+pub(crate) use pass_through::PassThrough;
 
 /// A mesh, and where an instance has placed it.
 #[derive(Clone, Copy)]

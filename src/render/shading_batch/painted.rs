@@ -24,7 +24,7 @@ pub(super) struct Painted {
     /// Whether they do; else nothing here counts.
     pub any: bool,
     /// How much of each point is seen, where maps or vertices were read.
-    pub(super) covered: Column,
+    pub(super) coverage: Column,
     base: Columns,
     emission: Columns,
     metallic: Column,
@@ -44,7 +44,7 @@ impl Default for Painted {
         let (one, three) = ([0.0; POINTS], [[0.0; POINTS]; 3]);
         Self {
             any: false,
-            covered: one,
+            coverage: one,
             base: three,
             emission: three,
             metallic: one,
@@ -148,9 +148,9 @@ impl Painted {
 }
 
 impl Painted {
-    /// A model at point `i`, which is `even` but for maps.
-    pub(super) fn model(&self, i: usize, even: &Model) -> Model {
-        match even {
+    /// A model at point `i`, which is `unmapped` but for maps.
+    pub(super) fn model(&self, i: usize, unmapped: &Model) -> Model {
+        match unmapped {
             Model::Unlit(_) => Model::Unlit(self.unlit(i)),
             Model::Phong(m) => Model::Phong(self.phong(i, m)),
             Model::MetalRough(m) => Model::MetalRough(self.metal_rough(i, m)),
@@ -186,20 +186,20 @@ impl ShadingBatch {
         context: &Context,
         traced: TracedRays,
         placed: PlacedMesh,
-        common: &MaterialConstants,
+        constants: &MaterialConstants,
     ) {
         let material = &context.scene.materials[placed.mesh.material as usize];
         self.painted.any = true;
         let widens = !context.lights.is_empty() && material.metal_rough().is_some();
         if let Some(material_maps) =
-            common.material_maps.as_ref().filter(|material_maps| material_maps.covers(placed.mesh))
+            constants.material_maps.as_ref().filter(|material_maps| material_maps.covers(placed.mesh))
         {
             self.read_material_maps(context, (material, material_maps), placed, widens);
             return;
         }
         let (mut prim, mut patch) = (NO_PRIM, None);
         for i in 0..self.count.min(POINTS) {
-            if self.found.certain[i] != 1 || common.one_sided && self.found.front[i] != 1 {
+            if self.found.certain[i] != 1 || constants.one_sided && self.found.front[i] != 1 {
                 continue;
             }
             let hit = &traced.hits()[self.rays[i] as usize];
@@ -219,8 +219,8 @@ impl ShadingBatch {
     fn read_at(&mut self, i: usize, context: &Context, material: &Material, patch: &Patch, widens: bool) {
         let reader = Reader { store: context.textures, patch: Some(patch), known: &[] };
         let base = reader.base(material);
-        self.painted.covered[i] = material.alpha_mode.covers(base.w);
-        if self.painted.covered[i] <= 0.0 {
+        self.painted.coverage[i] = material.alpha_mode.covers(base.w);
+        if self.painted.coverage[i] <= 0.0 {
             return;
         }
         self.painted.put(i, &Bsdf::read(material, base.truncate(), &reader));
@@ -228,7 +228,8 @@ impl ShadingBatch {
             let (view, geometric) = (get(&self.found.view, i), get(&self.found.geometric, i));
             let outward = if self.found.front[i] == 1 { geometric } else { -geometric };
             let own = patch.normal().unwrap_or(outward);
-            let normal = mapped_normal(patch, material, context.textures, own, side_of(own, geometric), view);
+            let normal =
+                mapped_normal(patch, material, context.textures, own, (side_of(own, geometric), geometric), view);
             put(&mut self.found.normal, i, normal);
         }
         if let Some(map) = material.normal_map.as_ref().filter(|_| widens && self.painted.has_narrow_highlight(i)) {

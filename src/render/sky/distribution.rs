@@ -48,15 +48,15 @@ impl EnvironmentDistribution {
             .flat_map(light)
             .map(|(x, row)| f64::from(level.texel(x, row).element_sum()) * f64::from(level.area(row)))
             .collect();
-        let whole: f64 = lights.iter().sum();
-        let even = if whole > 0.0 { even } else { 1.0 };
+        let total: f64 = lights.iter().sum();
+        let even = if total > 0.0 { even } else { 1.0 };
         let (mut rows, mut columns) = (Vec::with_capacity(height), Vec::with_capacity(height));
         let mut densities = Vec::with_capacity(width * height);
         let mut rows_sum = 0.0;
         for row in 0..height {
             let area = f64::from(level.area(row as u32));
             let chances = lights[row * width..][..width].iter().map(|light| {
-                let bright = if whole > 0.0 { light / whole } else { 0.0 };
+                let bright = if total > 0.0 { light / total } else { 0.0 };
                 bright * (1.0 - even) + even * area / (4.0 * std::f64::consts::PI)
             });
             let chances: Vec<f64> = chances.collect();

@@ -175,14 +175,14 @@ mod tests {
     /// The mean over the lobe by all texels.
     fn integral(sky: &Pyramid, lobe: &Lobe, normal: Vec3, view: Vec3) -> f32 {
         let grid = Level::without_texels(SIZE);
-        let (mut sum, mut whole) = (0.0, 0.0);
+        let (mut sum, mut total) = (0.0, 0.0);
         for (row, to) in grid.middles().filter(|(_, to)| to.dot(normal) > 0.0) {
             let facet = (view + to).normalize();
             let weight = f64::from(lobe.density(view, facet) * lobe.sent(view, to) * grid.area(row));
             sum += weight * f64::from(sky.radiance(to, 0.0).x);
-            whole += weight;
+            total += weight;
         }
-        (sum / whole) as f32
+        (sum / total) as f32
     }
 
     /// Normals that are seen from +z, all around and to 72°.
@@ -228,7 +228,7 @@ mod tests {
         let sky = sunny();
         let (mut found, mut good) = (Vec::new(), true);
         for (roughness, most, part) in [(0.3f32, 0.08, 0.8), (0.5, 0.12, 0.75), (0.8, 0.15, 0.6)] {
-            let (mut off, mut whole, mut around) = (0.0, 0.0, 0.0);
+            let (mut off, mut total, mut around) = (0.0, 0.0, 0.0);
             for normal in normals() {
                 let lobe = Lobe::even(normal, roughness * roughness);
                 let expected = integral(&sky, &lobe, normal, Vec3::Z);
@@ -236,9 +236,9 @@ mod tests {
                 let table = sky.blurred(reflect(Vec3::NEG_Z, normal), roughness).x;
                 off += (shown - expected) * (shown - expected);
                 around += (table - expected) * (table - expected);
-                whole += expected * expected;
+                total += expected * expected;
             }
-            let (off, around) = ((off / whole).sqrt(), (around / whole).sqrt());
+            let (off, around) = ((off / total).sqrt(), (around / total).sqrt());
             found.push((roughness, off, around));
             good &= off < most && off < part * around;
         }

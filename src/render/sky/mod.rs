@@ -3,13 +3,10 @@
 mod beyond;
 mod diffuse;
 mod distribution;
-mod environment_rays;
 mod gloss;
 mod hotspot;
 mod lookups;
 mod panorama;
-
-pub(crate) use environment_rays::{EnvironmentPoint, EnvironmentRays};
 
 use super::shade::{Lobe, ShadingFrame};
 use super::studio;
@@ -185,12 +182,12 @@ impl Sky {
     }
 
     /// A direction to look in for light, drawn with two numbers from 0 … 1; `None` where no direction is better than others.
-    fn draw(&self, at: [f32; 2]) -> Option<Vec3> {
+    pub(crate) fn draw(&self, at: [f32; 2]) -> Option<Vec3> {
         self.map.as_ref().map(|map| self.to_world(map, map.tables.distribution.draw(at)))
     }
 
     /// Radiance as [`Self::draw`] knows it, and the density of drawing this direction, 1/sr.
-    fn drawn(&self, dir: Vec3) -> (Vec3, f32) {
+    pub(crate) fn drawn(&self, dir: Vec3) -> (Vec3, f32) {
         self.map
             .as_ref()
             .map_or_else(|| (self.radiance(dir, 0.0), 0.0), |map| map.tables.distribution.look(self.to_map(map, dir)))
@@ -306,10 +303,10 @@ mod tests {
         // ∫ 1 over the sphere, as the mean of 1 / density.
         let n = 4096u16;
         let part = |i: u16| (f32::from(i) + 0.5) / f32::from(n);
-        let whole: f32 = (0..n)
+        let total: f32 = (0..n)
             .map(|i| sky.draw([part(i), (f32::from(i) * 0.618_034).fract()]).expect("a map is drawn from"))
             .map(|dir| 1.0 / sky.drawn(dir).1 / f32::from(n))
             .sum();
-        assert!((whole / (4.0 * std::f32::consts::PI) - 1.0).abs() < 0.02, "{whole}");
+        assert!((total / (4.0 * std::f32::consts::PI) - 1.0).abs() < 0.02, "{total}");
     }
 }

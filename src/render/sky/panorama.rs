@@ -228,14 +228,14 @@ impl Level {
             let rows: Vec<_> = taps(y, self.height, height).into_iter().map(|(k, share)| (over(k), share)).collect();
             let rows: Vec<_> = rows.into_iter().map(|(place, share)| (place, share * self.area(place.0))).collect();
             let texel = |columns: &Vec<(i32, f32)>| {
-                let (mut sum, mut whole) = (Vec3::ZERO, 0.0);
+                let (mut sum, mut total) = (Vec3::ZERO, 0.0);
                 for &((row, turn), weight) in &rows {
                     for &(column, share) in columns {
                         sum += self.texel((around(column) + turn) % self.width, row) * (weight * share);
-                        whole += weight * share;
+                        total += weight * share;
                     }
                 }
-                (sum / whole).to_array()
+                (sum / total).to_array()
             };
             columns.iter().map(texel).collect::<Vec<_>>()
         };
@@ -352,8 +352,8 @@ mod tests {
     #[test]
     fn the_texels_of_a_level_cover_the_sphere() {
         let grid = Level { width: 50, height: 31, texels: Arc::default() };
-        let whole: f32 = (0..31).map(|row| grid.area(row) * 50.0).sum();
-        assert!((whole - 4.0 * PI).abs() < 1e-4);
+        let total: f32 = (0..31).map(|row| grid.area(row) * 50.0).sum();
+        assert!((total - 4.0 * PI).abs() < 1e-4);
     }
 
     #[test]

@@ -134,7 +134,7 @@ impl<'a> Sampler<'a> {
             }
             self.trace(tracer, &mut course.places, (&mut course.pixels, &course.active), from..to)?;
             if round < looks(&self.rounds) {
-                self.look_around(tracer, &mut course, first, (round, from..to))?;
+                self.judge_neighbors(tracer, &mut course, first, (round, from..to))?;
             }
             if to >= FIRST_LOOK {
                 self.look(tracer, &mut course, to)?;
@@ -172,7 +172,7 @@ impl<'a> Sampler<'a> {
 
     /// Looks at the pixels beside each that goes on, after a round of these samples: of those near uneven ones that were done,
     /// others go on, too, and those that are certain by what is beside them are done.
-    fn look_around<A: Accel, P: Observer>(
+    fn judge_neighbors<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
         course: &mut Course,

@@ -5,7 +5,7 @@ use crate::math::simd::{Kernel, Level, Simd};
 use crate::render::draws::Stream;
 use crate::render::frame::{Frame, pixel_keys};
 use crate::render::observer::Observer;
-use crate::render::primary_rays::Place;
+use crate::render::primary_rays::CameraSample;
 use crate::render::roulette::Roulette;
 use crate::render::sampling::{Filter, Stochastic};
 use crate::render::sobol;
@@ -92,10 +92,12 @@ impl Places {
         if frame.settings.lens.is_some() {
             let pixels = x.iter().zip(&*y);
             tracer.by_chance.fill(true);
-            tracer.eyes.send(&eye, streams.clone().zip(pixels).map(|(stream, (&x, &y))| through(how, stream, [x, y])));
+            tracer
+                .primary_rays
+                .send(&eye, streams.clone().zip(pixels).map(|(stream, (&x, &y))| through(how, stream, [x, y])));
         } else {
             Level::best().run(Draw { filter: how.filter, keys, indices, x, y });
-            tracer.eyes.send_columns(&eye, x, y);
+            tracer.primary_rays.send_columns(&eye, x, y);
         }
         tracer.streams.extend(streams);
         tracer.trace().then_some(())
@@ -104,9 +106,9 @@ impl Places {
 
 /// Where a sample of the pixel with this corner goes through the picture and the lens. Its first two numbers are those without a
 /// lens.
-fn through(how: &Stochastic, Stream { key, index }: Stream, [x, y]: [f64; 2]) -> Place {
+fn through(how: &Stochastic, Stream { key, index }: Stream, [x, y]: [f64; 2]) -> CameraSample {
     let [across, down, u, v] = sobol::point(index, key);
-    Place { x: x + how.filter.place(across), y: y + how.filter.place(down), lens: [u, v] }
+    CameraSample { x: x + how.filter.place(across), y: y + how.filter.place(down), lens: [u, v] }
 }
 
 /// Moves samples from the corners of their pixels to their places.
@@ -156,7 +158,7 @@ mod tests {
                 let indices: Vec<u32> = (0..count).map(|i| i * i % 257).collect();
                 let mut x: Vec<f64> = (0..count).map(f64::from).collect();
                 let mut y: Vec<f64> = (0..count).map(|i| f64::from(3 * i)).collect();
-                let alone: Vec<Place> = (0..count as usize)
+                let alone: Vec<CameraSample> = (0..count as usize)
                     .map(|i| through(&how, Stream { key: keys[i], index: indices[i] }, [x[i], y[i]]))
                     .collect();
                 Level::best().run(Draw { filter, keys: &keys, indices: &indices, x: &mut x, y: &mut y });

@@ -15,7 +15,7 @@ use crate::render::certainty::output;
 use crate::render::context::Context;
 use crate::render::frame::Frame;
 use crate::render::observer::Observer;
-use crate::render::tile::{Tile, TilePixels, each_tile};
+use crate::render::tile::{Tile, TilePixels, TracedTiles, each_tile};
 use crate::render::whitted::Tracer;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -32,7 +32,7 @@ pub(in crate::render) fn render_all<A: Accel, P: Observer>(
     let output = output(how.space, frame.background);
     let sampler = Sampler::new(frame, how, output.as_ref(), context);
     let numbers: Vec<usize> = (0..tiles.len()).collect();
-    let (_, counts, complete) = if sampler.starts_with_one() {
+    let TracedTiles { counts, complete, .. } = if sampler.starts_with_one() {
         let shared = Shared::new(tiles, |tile| sampler.grown(tile, sampler.reach()));
         each_tile(context, accel, &numbers, progress, |tracer, &i| shared.finish(&sampler, tracer, i).map(keep))
     } else {

@@ -209,9 +209,9 @@ impl<'a> Surface<'a> {
         let side = self.side(own);
         (self.smooth, self.side) = (own * side, side);
         if patch.is_curved() {
-            self.horizon = facing(self.smooth, self.view);
+            self.horizon = facing(self.smooth, self.geometric, self.view);
         }
-        self.normal = mapped_normal(patch, material, store, own, side, self.view);
+        self.normal = mapped_normal(patch, material, store, own, (side, self.geometric), self.view);
     }
 
     /// 1 for a normal on the side that is seen, −1 for one on the other.
@@ -221,8 +221,8 @@ impl<'a> Surface<'a> {
 
     /// What lobes over it lie on.
     pub(crate) fn lobe_frame(&self) -> LobeFrame<'_> {
-        let Self { smooth, side, normal, view, .. } = *self;
-        LobeFrame { patch: self.patch.as_ref(), smooth, side, normal, view }
+        let Self { smooth, side, geometric, normal, view, .. } = *self;
+        LobeFrame { patch: self.patch.as_ref(), smooth, side, geometric, normal, view }
     }
 
     /// How its normal turns along both axes of the ray's cone before maps turn it.
@@ -326,13 +326,13 @@ pub(crate) fn mapped_normal(
     material: &Material,
     store: &TextureStore,
     own: Vec3,
-    side: f32,
+    (side, geometric): (f32, Vec3),
     view: Vec3,
 ) -> Vec3 {
     let turned = |map| patch.normal_mapped(own, map, material.normal_scale, store);
     let mapped = material.normal_map.as_ref().and_then(turned).unwrap_or(own);
     let bumped = patch.bumped(mapped, material, store).unwrap_or(mapped);
-    facing(bumped * side, view)
+    facing(bumped * side, geometric, view)
 }
 
 /// Least cosine of the view with a normal for shading.
@@ -346,10 +346,11 @@ pub(crate) fn faces(normal: Vec3, view: Vec3) -> bool {
 
 /// `normal`, turned just far enough that `view` sees its front.
 ///
-/// Interpolated and mapped normals may point away at silhouettes; unturned they would make black rims.
+/// Interpolated and mapped normals may point away at silhouettes; unturned they would make black rims. That of the face itself,
+/// `geometric`, does not, however flat it is seen.
 #[inline(always)]
-pub(crate) fn facing(normal: Vec3, view: Vec3) -> Vec3 {
-    if faces(normal, view) {
+pub(crate) fn facing(normal: Vec3, geometric: Vec3, view: Vec3) -> Vec3 {
+    if faces(normal, view) || (normal == geometric && normal.dot(view) > 0.0) {
         return normal;
     }
     (normal + view * (GRAZING - normal.dot(view))).try_normalize().unwrap_or(view)

@@ -207,10 +207,15 @@ fn smooth_normals_are_interpolated_and_scaled_as_normals() {
 
 #[test]
 fn a_normal_that_points_away_is_turned_until_it_is_seen() {
-    let turned = facing(Vec3::new(0.8, 0.0, -0.6), Vec3::Z);
+    let facing_z = |normal| facing(normal, Vec3::Y, Vec3::Z);
+    let turned = facing_z(Vec3::new(0.8, 0.0, -0.6));
     assert!(turned.dot(Vec3::Z) > 0.0 && turned.x > 0.9 && turned.is_normalized());
-    assert_eq!(facing(Vec3::Z, Vec3::Z), Vec3::Z);
-    assert!(facing(Vec3::NEG_Z, Vec3::Z).is_normalized());
+    assert_eq!(facing_z(Vec3::Z), Vec3::Z);
+    assert!(facing_z(Vec3::NEG_Z).is_normalized());
+    // A face's own normal is right however flat it is seen, as long as it is seen.
+    let flat = Vec3::new(1.0, 0.0, 1e-3).normalize();
+    assert_eq!(facing(flat, flat, Vec3::Z), flat);
+    assert!(facing(flat, Vec3::X, Vec3::Z) != flat && facing(-flat, -flat, Vec3::Z).z > 0.0);
 }
 
 #[test]

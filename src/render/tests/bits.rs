@@ -104,9 +104,9 @@ fn plain() -> Stage {
     );
     let polished = Phong { mirror: Vec3::new(0.3, 0.2, 0.1), fresnel: true, ..phong() };
     s.mesh(round(0.4), turned(0.2, DVec3::new(-2.0, -1.0, 0.5)), material(Vec3::new(0.3, 0.3, 0.5), polished));
-    let shiny = Phong { specular: Vec3::splat(0.4), shininess: 9.0, ambient: Vec3::splat(0.2), ..phong() };
+    let needs_cones = Phong { specular: Vec3::splat(0.4), shininess: 9.0, ambient: Vec3::splat(0.2), ..phong() };
     let mirrored = turned(-0.5, DVec3::new(1.0, 0.2, 0.3)) * DAffine3::from_scale(DVec3::new(-1.0, 1.5, 1.0));
-    s.mesh(round(0.6), mirrored, material(Vec3::new(0.2, 0.5, 0.7), shiny));
+    s.mesh(round(0.6), mirrored, material(Vec3::new(0.2, 0.5, 0.7), needs_cones));
     s.mesh(square(0.0, 0.4), turned(0.7, DVec3::new(0.0, -0.8, 1.0)), material(Vec3::X, phong()));
     s.mesh(square(0.0, 0.3), turned(0.1, DVec3::new(0.2, 1.4, 0.0)), unlit(Vec3::new(0.1, 0.9, 0.3)));
     s.mesh(square(0.5, 0.3), DAffine3::from_rotation_y(3.0), Material { double_sided: false, ..Material::plain() });
@@ -206,7 +206,7 @@ fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one()
         let mut s = painted();
         let store = TextureStore::new(&s.scene);
         let beside = |m: &Material| {
-            MaterialConstants::of((0, m), &store, depth > 0, Gloss::new(None)).is_some_and(|common| common.mapped)
+            MaterialConstants::of((0, m), &store, depth > 0, Gloss::new(None)).is_some_and(|constants| constants.mapped)
         };
         assert!(s.scene.materials.iter().all(beside), "nothing would be compared");
         (s.settings.depth, s.scene.environment) = (Some(depth), environment);
@@ -327,7 +327,8 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
         let mut s = glazed(if textures > 0 { painted() } else { plain() }, textures);
         let store = TextureStore::new(&s.scene);
         let beside = |m: &&Material| {
-            MaterialConstants::of((0, m), &store, true, Gloss::new(None)).is_some_and(|common| common.glass.is_some())
+            MaterialConstants::of((0, m), &store, true, Gloss::new(None))
+                .is_some_and(|constants| constants.glass.is_some())
         };
         // What scatters inside is shaded one by one.
         let expected = if textures > 0 { 4 } else { 6 };
@@ -414,7 +415,8 @@ fn lobes_shaded_side_by_side_have_the_bits_of_lobes_shaded_one_by_one() {
         (s.settings.depth, s.settings.env_rays, s.scene.environment) = (Some(depth), env_rays, environment);
         let store = TextureStore::new(&s.scene);
         let beside = |m: &&Material| {
-            MaterialConstants::of((0, m), &store, true, Gloss::new(None)).is_some_and(|common| common.lobes.is_some())
+            MaterialConstants::of((0, m), &store, true, Gloss::new(None))
+                .is_some_and(|constants| constants.lobes.is_some())
         };
         assert!(s.scene.materials.iter().filter(beside).count() >= 5, "nothing would be compared");
         same_one_by_one(&mut s, &format!("{textures} textures, depth {depth}"));
@@ -467,8 +469,8 @@ fn sheen_and_coat_over_points_side_by_side_have_the_bits_of_those_over_points_on
         (s.settings.depth, s.settings.env_rays, s.scene.environment) = (Some(depth), env_rays, environment);
         let store = TextureStore::new(&s.scene);
         let are_overlays = |m: &&Material| {
-            let common = MaterialConstants::of((0, m), &store, true, Gloss::new(None));
-            common.and_then(|common| common.lobes).is_some_and(|lobes| lobes.are_overlays)
+            let constants = MaterialConstants::of((0, m), &store, true, Gloss::new(None));
+            constants.and_then(|constants| constants.lobes).is_some_and(|lobes| lobes.are_overlays)
         };
         assert!(s.scene.materials.iter().filter(are_overlays).count() >= 4, "nothing would be compared");
         same_one_by_one(&mut s, &format!("{textures} textures, depth {depth}"));
@@ -483,7 +485,7 @@ fn rough_surfaces_that_spread_rays_have_the_same_bits_side_by_side() {
         s.scene.environment = Environment::Studio;
         let store = TextureStore::new(&s.scene);
         let beside = |m: &&Material| {
-            MaterialConstants::of((0, m), &store, true, Gloss::new(Some(2))).is_some_and(|common| common.spreads)
+            MaterialConstants::of((0, m), &store, true, Gloss::new(Some(2))).is_some_and(|constants| constants.spreads)
         };
         assert!(s.scene.materials.iter().filter(beside).count() >= 5, "nothing would be compared");
         let together = same_one_by_one(&mut s, &format!("{textures} textures, depth {depth}"));

@@ -13,12 +13,12 @@ mod instances;
 mod leaf;
 mod light;
 mod mirrors;
+mod ray_tree;
 mod round;
 mod sampling;
 mod see_through;
 mod sight;
 mod soft;
-mod story;
 mod tiles;
 
 use super::texture::TextureStore;

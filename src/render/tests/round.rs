@@ -1,7 +1,7 @@
 //! Coarse meshes that stand for something round.
 
 use super::*;
-use crate::render::story::{Class, tell};
+use crate::render::ray_tree::{Class, tell};
 
 /// A ball of radius 1 about the y axis with so many faces around and from pole to pole, and its own normals.
 pub(super) fn ball(around: u32, down: u32) -> Mesh {

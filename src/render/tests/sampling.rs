@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::image::diff::{Space, compare};
-use crate::image::look::developed;
+use crate::image::statistics::developed;
 use crate::image::{Output, Values, srgb};
 use crate::math::DQuat;
 use crate::render::{

@@ -6,9 +6,9 @@
 
 use super::ColorSpace;
 use super::decode::{self, FRACTION, Texels};
+use crate::huge_pages::Paged;
 use crate::math::Vec4;
 use crate::math::simd::Simd;
-use crate::pages::Paged;
 use crate::scene::{Bitmap, Pixels};
 use std::sync::OnceLock;
 

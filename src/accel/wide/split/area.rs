@@ -42,7 +42,7 @@ struct Ruler {
 
 /// Where a set is cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Place {
+struct SplitPlane {
     axis: usize,
     /// The first of the second part.
     bin: usize,
@@ -116,7 +116,7 @@ impl<const N: usize> Bins<N> {
     }
 
     /// What an empty part costs is no number, and never less.
-    fn cheapest(&self, leaf: u32) -> Option<Place> {
+    fn cheapest(&self, leaf: u32) -> Option<SplitPlane> {
         let mut after = [Vec4::ZERO; N];
         let mut part = Sides::EMPTY;
         for i in (1..N).rev() {
@@ -136,7 +136,7 @@ impl<const N: usize> Bins<N> {
         let axes = (0..3).filter(|&k| at[k] > 0);
         // The first of equals.
         let axis = axes.reduce(|a, b| if least[b] < least[a] { b } else { a })?;
-        Some(Place { axis, bin: usize::from(at[axis]), cost: least[axis] })
+        Some(SplitPlane { axis, bin: usize::from(at[axis]), cost: least[axis] })
     }
 
     fn parts(&self, axis: usize, bin: usize) -> [Bounds; 2] {
@@ -196,8 +196,8 @@ fn cut_in<const N: usize>(items: &mut [Item], leaf: u32, middles: Option<Bounds>
     let (axis, bin) = match bins.cheapest(leaf) {
         None => return halves(items),
         // Boxes without any area, of prims on a line or so small that it underflows: all cuts cost as little.
-        Some(Place { cost: 0.0, .. }) => (ruler.longest_axis(), N / 2),
-        Some(Place { axis, bin, .. }) => (axis, bin),
+        Some(SplitPlane { cost: 0.0, .. }) => (ruler.longest_axis(), N / 2),
+        Some(SplitPlane { axis, bin, .. }) => (axis, bin),
     };
     #[expect(clippy::cast_precision_loss, reason = "a few bins")]
     let second = Vec4::splat(TO_INTEGER + bin as f32);
@@ -264,8 +264,8 @@ mod tests {
     use crate::math::random::Random;
 
     /// The cheapest cut by its definition: axis by axis, place by place, the boxes of both parts made anew.
-    fn defined<const N: usize>(bins: &Bins<N>, leaf: u32) -> Option<Place> {
-        let mut best: Option<Place> = None;
+    fn defined<const N: usize>(bins: &Bins<N>, leaf: u32) -> Option<SplitPlane> {
+        let mut best: Option<SplitPlane> = None;
         for axis in 0..3 {
             for bin in 1..N {
                 let counts = [0..bin, bin..N].map(|part| bins.counts[part].iter().map(|c| c[axis]).sum::<i32>());
@@ -273,7 +273,7 @@ mod tests {
                 let cost =
                     a.area() * weight(counts[0], leaf.cast_signed()) + b.area() * weight(counts[1], leaf.cast_signed());
                 if cost < best.map_or(f32::INFINITY, |best| best.cost) {
-                    best = Some(Place { axis, bin, cost });
+                    best = Some(SplitPlane { axis, bin, cost });
                 }
             }
         }

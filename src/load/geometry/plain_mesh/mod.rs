@@ -278,12 +278,12 @@ fn geometry(mut bare: PlainMesh, file: &Path, warnings: &mut Warnings) -> Geomet
         }
     };
     let end = |&i: &u32| if is_by_corner { Corner { uv: NONE, ..corner(i) } } else { corner(i) };
-    let strokes = edges.iter().map(|_| WireStatement { run: 0, line: 0, arity: 2, joined: true }).collect();
-    let stroke_corners = edges.iter().flatten().map(end).collect();
+    let wire_statements = edges.iter().map(|_| WireStatement { run: 0, line: 0, arity: 2, joined: true }).collect();
+    let wire_corners = edges.iter().flatten().map(end).collect();
     let numbered = corners.par_iter().zip(&numbers).with_min_len(MANY);
     let corners = numbered.map(|(&i, &uv)| Corner { uv, ..corner(i) }).collect();
     let (colors, alphas) = parts(colors);
-    let mut soup = Soup { positions, uvs, normals, colors, alphas, corners, stroke_corners };
+    let mut soup = Soup { positions, uvs, normals, colors, alphas, corners, wire_corners };
     if !is_cloud {
         soup.leave_out_unused(&[]);
     }
@@ -308,13 +308,13 @@ fn geometry(mut bare: PlainMesh, file: &Path, warnings: &mut Warnings) -> Geomet
     Geometry {
         soup,
         faces,
-        strokes,
+        wire_statements,
         is_cloud,
         runs: std::iter::once(Run::default()).chain((1..=shown).map(of_picture)).collect(),
         names: std::iter::once(String::new()).chain(pictures.iter().map(|(_, name)| name.clone())).collect(),
         sources: pictures,
         triangles: Vec::new(),
-        stretches: Vec::new(),
+        face_spans: Vec::new(),
         places: bare.places.unwrap_or(EXACT),
         comments: bare.comments,
         few_corners: u32::try_from(bare.few_corners).unwrap_or(u32::MAX),

@@ -1,6 +1,6 @@
 //! Pictures that files of bare geometry name -> the materials that show them.
 
-use crate::load::finder::{Finder, Place};
+use crate::load::finder::{Finder, FoundPath};
 use crate::load::mtl::{Materials, Reading, plain_material};
 use crate::load::paths::{FileFault, taken_from};
 use crate::load::texture::{Encoded, Unusable, decode_all};
@@ -80,7 +80,7 @@ fn showing(name: &str, texture: u32) -> Material {
 ///
 /// # Errors
 /// The warning that it is not there.
-fn find(name: &str, place: &str, missed: &mut usize, reading: &mut Reading) -> Result<Place, Diagnostic> {
+fn find(name: &str, place: &str, missed: &mut usize, reading: &mut Reading) -> Result<FoundPath, Diagnostic> {
     let mut finder = Finder { resolver: reading.resolver, missed };
     let found = finder.find(name, &[Path::new("")]).map_err(|fault| lost(&fault, place, reading.file))?;
     if found.guessed {

@@ -77,7 +77,8 @@ pub(in crate::load::gltf) fn play(
     let mut aims = Aims::default();
     for (k, channel) in animation.channels.iter().enumerate() {
         let Some(channel) = channel else { continue };
-        let place = Place { channel: format!("{place}.channels[{k}]"), animation: &place, sampler: channel.sampler };
+        let place =
+            ChannelSource { channel: format!("{place}.channels[{k}]"), animation: &place, sampler: channel.sampler };
         let (pointer, whole) = match &channel.target {
             Target::Nothing => continue,
             Target::Lost(why) => {
@@ -102,13 +103,13 @@ pub(in crate::load::gltf) fn play(
 }
 
 /// Where a channel stands in the file.
-struct Place<'a> {
+struct ChannelSource<'a> {
     channel: String,
     animation: &'a str,
     sampler: usize,
 }
 
-impl Place<'_> {
+impl ChannelSource<'_> {
     fn of_sampler(&self, part: Part) -> String {
         let part = match part {
             Part::Input => "input",
@@ -145,7 +146,7 @@ enum Fault {
 }
 
 impl Fault {
-    fn tell(self, place: &Place, report: &mut Report) {
+    fn tell(self, place: &ChannelSource, report: &mut Report) {
         let left_out = "the channel is left out";
         match self {
             Self::Target(code, text) => report.warn_with(code, format!("{}.target", place.channel), text, left_out),
@@ -193,7 +194,7 @@ impl<'a> Player<'a, '_> {
     }
 
     /// Evaluates one channel into the pose.
-    fn channel(&mut self, channel: &Channel, place: &Place) -> Result<Result<(), Fault>, OverBudget> {
+    fn channel(&mut self, channel: &Channel, place: &ChannelSource) -> Result<Result<(), Fault>, OverBudget> {
         let times = self.times(channel.input, place)?;
         if let Some(owner) = channel.target.morphed().filter(|owner| self.morphed.insert(*owner)) {
             self.budget.take(self.targets(owner) as u64, WEIGHT)?;
@@ -206,7 +207,7 @@ impl<'a> Player<'a, '_> {
     }
 
     /// The times of the keys, read and told of once.
-    fn times(&mut self, input: Index<Accessor>, place: &Place) -> Result<Option<Rc<[f32]>>, OverBudget> {
+    fn times(&mut self, input: Index<Accessor>, place: &ChannelSource) -> Result<Option<Rc<[f32]>>, OverBudget> {
         if let Some(known) = self.times.get(&input.value()) {
             return Ok(known.clone());
         }
@@ -258,7 +259,13 @@ impl<'a> Player<'a, '_> {
     }
 
     /// What stands where a pointer leads at the moment, put into the pose.
-    fn pointed(&mut self, channel: &Channel, pointed: &Pointed, times: &[f32], place: &Place) -> Result<(), Fault> {
+    fn pointed(
+        &mut self,
+        channel: &Channel,
+        pointed: &Pointed,
+        times: &[f32],
+        place: &ChannelSource,
+    ) -> Result<(), Fault> {
         let between = Between::of(times, self.time);
         let keys = Keys { reader: self.reader, channel, count: times.len() };
         let value = match pointed.form {

@@ -46,7 +46,9 @@ fn a_variant_is_chosen_by_name_or_number_and_what_it_does_not_map_stays() {
     let plain = file.load();
     assert_eq!((shown(&plain), plain.facts.variant), (vec!["own", "own"], None));
     assert_eq!(plain.facts.variants, ["Beach", "Street", "1"]);
-    assert_eq!(plain.facts.extensions, [("KHR_materials_variants".to_owned(), false, true)]);
+    let [extension] = &plain.facts.extensions[..] else { panic!("{:?}", plain.facts.extensions) };
+    assert_eq!(extension.name, "KHR_materials_variants");
+    assert!(!extension.required && extension.supported);
     assert!(codes(&plain).is_empty(), "{:?}", plain.warnings);
 
     for (wish, materials, number) in

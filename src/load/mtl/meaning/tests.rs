@@ -79,7 +79,7 @@ fn dissolve_blends_unless_illum_or_a_filter_makes_it_glass() {
     let (m, _) = guess("Kd 1 1 1\nd 0.25\nillum 6\nNi 1.52\nKs 0.1 0.1 0.1\nNs 9");
     assert_eq!((m.opacity, m.alpha_mode, m.base_color), (1.0, AlphaMode::Opaque, Vec3::splat(0.25)));
     let p = phong(&m);
-    assert_eq!((p.transmission, p.mirror, p.ior, p.fresnel), (Vec3::splat(0.675), Vec3::splat(0.1), 1.52, false));
+    assert_eq!((p.transmission, p.mirror, p.ior, p.fresnel), (Vec3::splat(0.75 * 0.9), Vec3::splat(0.1), 1.52, false));
 
     let (m, _) = guess("Kd 0 0 0\nTf 1 0.5 0\nillum 2\nNi 1.5");
     assert_eq!(phong(&m).transmission, Vec3::new(1.0, 0.5, 0.0));

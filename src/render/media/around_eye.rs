@@ -1,27 +1,28 @@
 //! What an eye is inside of: rays from it begin there, are bent by what they leave, and absorbed from the start.
 
-use super::context::Context;
-use super::media::{Media, MediaTable, Medium};
-use super::shade::has_inside;
-use super::surface::{HitPrim, Surface};
-use super::view::View;
 use crate::accel::{Accel, Hit, NoProbe, Ray};
 use crate::math::Vec3;
+use crate::render::context::Context;
+use crate::render::media::{Media, MediaTable, Medium};
+use crate::render::seam::is_same_crossing;
+use crate::render::shade::has_inside;
+use crate::render::surface::{HitPrim, Surface};
+use crate::render::view::View;
 use crate::scene::{Material, Reflection};
 
-/// Surfaces that are looked at along one way.
-const FACES: usize = 256;
+/// Surfaces that are looked at along one way; where there are more behind each other, it says nothing.
+const FACES: usize = 1024;
 
-/// The substances around the eye of a view, the innermost last, where any have an inside: those that are left without having been entered,
-/// whichever way one goes. Panes without an inside are so left on some ways only.
-pub(super) fn media_around<A: Accel>(context: &Context, accel: &A, view: &View) -> Vec<Medium> {
+/// The substances around the eye of a view, the innermost last, where any have an inside: those that are left without
+/// having been entered, whichever way one goes. Panes without an inside are so left on some ways only.
+pub(in crate::render) fn media_around<A: Accel>(context: &Context, accel: &A, view: &View) -> Vec<Medium> {
     if !context.scene.materials.iter().any(has_inside) {
         return Vec::new();
     }
     let mut scratch = accel.scratch();
-    let mut left = ways(view).map(|dir| left_along(context, accel, &mut scratch, view, dir));
+    let mut left = ways(view).filter_map(|dir| left_along(context, accel, &mut scratch, view, dir));
     let Some(first) = left.next() else { return Vec::new() };
-    let around = left.fold(first, |around, left| around.into_iter().filter(|m| left.contains(m)).collect());
+    let around = left.fold(first, |around, left| common(&around, left));
     // The first that is left is the innermost.
     let medium = |&material: &u32| Medium { material, ior: index(&context.scene.materials[material as usize]) };
     around.iter().rev().map(medium).collect()
@@ -33,22 +34,40 @@ fn ways(view: &View) -> impl Iterator<Item = Vec3> {
     std::iter::once(view.forward.as_vec3()).chain((0..8).map(corner))
 }
 
-/// Materials that are left on one way without having been entered.
-fn left_along<A: Accel>(context: &Context, accel: &A, scratch: &mut A::Scratch, view: &View, dir: Vec3) -> Vec<u32> {
+/// What of the first list is in the second, too, as often as it is there: bodies of one material may lie in each other.
+fn common(first: &[u32], mut second: Vec<u32>) -> Vec<u32> {
+    let is_in_both = |material: &&u32| {
+        let at = second.iter().position(|other| other == *material);
+        at.map(|at| second.swap_remove(at)).is_some()
+    };
+    first.iter().filter(is_in_both).copied().collect()
+}
+
+/// Materials that are left on one way without having been entered, each as often as it is; `None` where the way has no end.
+fn left_along<A: Accel>(
+    context: &Context,
+    accel: &A,
+    scratch: &mut A::Scratch,
+    view: &View,
+    dir: Vec3,
+) -> Option<Vec<u32>> {
     let origin = (view.eye - context.world.center).as_vec3();
     let ray = Ray::new(origin, dir);
     let (mut table, mut entered, mut left) = (MediaTable::default(), Media::OUTSIDE, Vec::new());
     let mut hit = [Hit::MISS];
     accel.closest(&[ray], &mut hit, scratch, &mut NoProbe);
+    let mut crossed = Hit::MISS;
     for _ in 0..FACES {
         if !hit[0].is_some() {
-            break;
+            return Some(left);
         }
+        let is_repeated = is_same_crossing(|prim| context.face(prim), &ray, &crossed, &hit[0]);
+        crossed = hit[0];
         let target = HitPrim::new(context.scene, context.world, hit[0].prim);
-        if has_inside(target.material) {
+        if has_inside(target.material) && !is_repeated {
             let entering = Surface::new(context.world, target, &ray, &hit[0], 0.0).front;
             let beyond = table.cross(entered, Medium { material: target.material_id, ior: 1.0 }, entering).beyond;
-            if !entering && beyond == entered && !left.contains(&target.material_id) {
+            if !entering && beyond == entered {
                 left.push(target.material_id);
             }
             entered = beyond;
@@ -56,7 +75,7 @@ fn left_along<A: Accel>(context: &Context, accel: &A, scratch: &mut A::Scratch, 
         let after = hit;
         accel.next(&[ray], &after, &mut hit, scratch, &mut NoProbe);
     }
-    left
+    None
 }
 
 /// Index of refraction of the inside of a material.

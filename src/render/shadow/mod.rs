@@ -1,11 +1,14 @@
 //! Shadow rays, to lights and to the surroundings, traced in waves.
 
-use super::asking::Asking;
+pub(super) mod curve;
+pub(super) mod filters;
+
 use super::context::Context;
-use super::curve::ShadowRays;
-use super::filters::{Inside, Met, Passed, Through, filter_at, weaken};
 use super::media::{Media, MediaTable};
 use super::observer::Observer;
+use super::ray_caster::RayCaster;
+use super::shadow::curve::ShadowRays;
+use super::shadow::filters::{FilterHit, FilterHits, RayMedia, ShadowFilter, filter_at, weaken};
 use super::surface::HitPrim;
 use super::tail::Tail;
 use crate::accel::{Accel, Hit, Ray};
@@ -19,17 +22,17 @@ pub(crate) struct ShadowQueue {
     rays: Tail<Ray>,
     light: Tail<Bound>,
     /// What each is inside of; empty where nothing absorbs light.
-    inside: Vec<Inside>,
+    inside: Vec<RayMedia>,
     /// Of rays that end at what would bend or spread them the hit that each has left, with `t` as far as it may meet the same
     /// surface again.
     unbent: Vec<Hit>,
     /// The ways up to where some of the rays start, and which those are.
     risers: Vec<Ray>,
     raised: Vec<usize>,
-    blocked: Vec<bool>,
+    occluded: Vec<bool>,
     /// What they meet that lets light through in part, and that of one of them in order.
-    met: RefCell<Met>,
-    in_order: Vec<Passed>,
+    filter_hits: RefCell<FilterHits>,
+    in_order: Vec<FilterHit>,
     /// Those that go on from surface to surface: their numbers, the rays, the hit that each has passed last, the last that was
     /// no hole, and the one behind.
     going: Vec<usize>,
@@ -79,7 +82,7 @@ impl ShadowQueue {
     pub(crate) fn push_bound(&mut self, ray: Ray, light: Bound, media: Option<Media>) {
         self.rays.push(ray);
         self.light.push(light);
-        self.inside.extend(media.map(Inside::of));
+        self.inside.extend(media.map(RayMedia::of));
     }
 
     /// Room for `N` more rays, and for the light of each; [`Self::take`] takes those that came.
@@ -92,7 +95,7 @@ impl ShadowQueue {
     pub(crate) fn take(&mut self, count: usize, media: impl Iterator<Item = Media>) {
         self.rays.grow(count);
         self.light.grow(count);
-        self.inside.extend(media.map(Inside::of));
+        self.inside.extend(media.map(RayMedia::of));
     }
 
     pub(crate) fn clear(&mut self) {
@@ -108,29 +111,29 @@ impl ShadowQueue {
     pub(crate) fn trace<A: Accel, P: Observer>(
         &mut self,
         (context, media): (&Context, &mut MediaTable),
-        asking: &mut Asking<A>,
+        caster: &mut RayCaster<A>,
         probe: &mut P,
         mut arrive: impl FnMut(u32, Vec3),
     ) {
-        self.blocked.clear();
-        self.blocked.resize(self.rays.len(), false);
+        self.occluded.clear();
+        self.occluded.resize(self.rays.len(), false);
         self.going.clear();
         if context.asks_filters() {
-            self.met.get_mut().begin(self.rays.len());
-            let through = Through::new(context, &self.rays, &self.met);
-            asking.stopped(&through, &mut self.blocked, probe);
-            self.climb(context, asking, probe);
+            self.filter_hits.get_mut().begin(self.rays.len());
+            let shadow_filter = ShadowFilter::new(context, &self.rays, &self.filter_hits);
+            caster.stopped(&shadow_filter, &mut self.occluded, probe);
+            self.climb(context, caster, probe);
             self.pass(context, media);
         } else {
-            asking.occluded(&self.rays, &mut self.blocked, probe);
-            self.climb(context, asking, probe);
+            caster.occluded(&self.rays, &mut self.occluded, probe);
+            self.climb(context, caster, probe);
             if context.has_filters {
-                let blocked = &self.blocked;
-                self.going.extend((0..self.rays.len()).filter(|&i| !blocked[i]));
+                let occluded = &self.occluded;
+                self.going.extend((0..self.rays.len()).filter(|&i| !occluded[i]));
             }
         }
-        self.go_through((context, media), asking, probe);
-        let open = self.light.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked);
+        self.go_through((context, media), caster, probe);
+        let open = self.light.iter().zip(&self.occluded).filter(|(_, occluded)| !**occluded);
         open.for_each(|(light, _)| arrive(light.tag, light.radiance));
         self.clear();
     }
@@ -138,17 +141,17 @@ impl ShadowQueue {
     /// Weakens the light of rays by all that they have met, in the order of the hits; of those that have met too much to note
     /// it all, tells that they go on by themselves.
     fn pass(&mut self, context: &Context, media: &mut MediaTable) {
-        let met = self.met.get_mut();
+        let filter_hits = self.filter_hits.get_mut();
         for i in 0..self.rays.len() {
-            let noted = met.last(i);
-            if noted == Met::NOTHING || self.blocked[i] {
+            let noted = filter_hits.last(i);
+            if noted == FilterHits::NOTHING || self.occluded[i] {
                 continue;
             }
-            if noted == Met::TOO_MUCH {
+            if noted == FilterHits::OVERFLOW {
                 self.going.push(i);
                 continue;
             }
-            met.list(noted, &mut self.in_order);
+            filter_hits.list(noted, &mut self.in_order);
             let (light, mut crossed) = (&mut self.light[i].radiance, Hit::MISS);
             for passed in &self.in_order {
                 weaken(
@@ -159,8 +162,8 @@ impl ShadowQueue {
                     light,
                     self.inside.get_mut(i).map(|inside| (inside, &mut *media)),
                 );
-                self.blocked[i] = is_dark(*light);
-                if self.blocked[i] {
+                self.occluded[i] = is_dark(*light);
+                if self.occluded[i] {
                     break;
                 }
             }
@@ -171,7 +174,7 @@ impl ShadowQueue {
     fn go_through<A: Accel, P: Observer>(
         &mut self,
         (context, media): (&Context, &mut MediaTable),
-        asking: &mut Asking<A>,
+        caster: &mut RayCaster<A>,
         probe: &mut P,
     ) {
         if self.going.is_empty() {
@@ -183,31 +186,31 @@ impl ShadowQueue {
         self.after.resize(self.going.len(), Hit::MISS);
         self.crossed.clone_from(&self.after);
         self.hits.clone_from(&self.after);
-        asking.closest(&self.on_way, &mut self.hits, probe);
+        caster.closest(&self.on_way, &mut self.hits, probe);
         while !self.going.is_empty() {
             self.filter(context, media);
             self.hits.clear();
             self.hits.resize(self.going.len(), Hit::MISS);
-            asking.next(&self.on_way, &self.after, &mut self.hits, probe);
+            caster.next(&self.on_way, &self.after, &mut self.hits, probe);
         }
     }
 
     /// Blocks the rays whose starts are cut off from their surfaces, and weakens those that are so in part.
-    fn climb<A: Accel, P: Observer>(&mut self, context: &Context, asking: &mut Asking<A>, probe: &mut P) {
+    fn climb<A: Accel, P: Observer>(&mut self, context: &Context, caster: &mut RayCaster<A>, probe: &mut P) {
         if self.risers.is_empty() {
             return;
         }
         if !context.has_filters {
             let mut cut_off = vec![false; self.risers.len()];
-            asking.occluded(&self.risers, &mut cut_off, probe);
-            self.raised.iter().zip(cut_off).for_each(|(&i, cut_off)| self.blocked[i] |= cut_off);
+            caster.occluded(&self.risers, &mut cut_off, probe);
+            self.raised.iter().zip(cut_off).for_each(|(&i, cut_off)| self.occluded[i] |= cut_off);
             return;
         }
         // What they meet is asked itself, so that it does not matter of what it is known that it stops light.
         let (mut rays, mut raised) = (self.risers.clone(), self.raised.clone());
         let mut hits = vec![Hit::MISS; rays.len()];
-        asking.closest(&rays, &mut hits, probe);
-        while !rays.is_empty() && !asking.cancelled {
+        caster.closest(&rays, &mut hits, probe);
+        while !rays.is_empty() && !caster.cancelled {
             let mut after = Vec::new();
             for k in 0..rays.len() {
                 let (ray, i) = (rays[k], raised[k]);
@@ -217,8 +220,8 @@ impl ShadowQueue {
                 let light = &mut self.light[i].radiance;
                 let target = HitPrim::new(context.scene, context.world, hits[k].prim);
                 *light *= filter_at(context, &target, &ray, &hits[k], None);
-                self.blocked[i] |= is_dark(*light);
-                if !self.blocked[i] {
+                self.occluded[i] |= is_dark(*light);
+                if !self.occluded[i] {
                     (rays[after.len()], raised[after.len()]) = (ray, i);
                     after.push(hits[k]);
                 }
@@ -226,7 +229,7 @@ impl ShadowQueue {
             rays.truncate(after.len());
             raised.truncate(after.len());
             hits.truncate(after.len());
-            asking.next(&rays, &after, &mut hits, probe);
+            caster.next(&rays, &after, &mut hits, probe);
         }
     }
 
@@ -241,8 +244,8 @@ impl ShadowQueue {
             let (ray, light, mut crossed) = (self.on_way[k], &mut self.light[i].radiance, self.crossed[k]);
             let inside = self.inside.get_mut(i).map(|inside| (inside, &mut *media));
             weaken(context, (&ray, self.unbent.get(i)), &mut crossed, &hit.into(), light, inside);
-            self.blocked[i] = is_dark(*light);
-            if self.blocked[i] {
+            self.occluded[i] = is_dark(*light);
+            if self.occluded[i] {
                 continue;
             }
             (self.going[kept], self.on_way[kept], self.after[kept], self.crossed[kept]) = (i, ray, hit, crossed);

@@ -1,11 +1,11 @@
 //! A material as written -> a material as it is drawn.
 //!
-//! MTL has many careless writers. Under [`MtlMode::Guess`] the values that no one can have meant are replaced, each with
-//! a counted warning; under [`MtlMode::Literal`] the text counts. Both agree on this: colours are linear (the founding
-//! texts know nothing else, and Blender writes them so; [`super::writer`] tells when they are guessed not to be) and pictures
-//! sRGB-coded; surfaces are seen from both sides; `illum` 3 and above mirror by `Ks`, of these 4, 6, 7 and 9 are transparent
-//! and let through what they do not mirror, 5 and 7 have Fresnel's balance; a material with fields of physically based rendering (`Pr`, `Pm`, …) is one, and its `Ks`
-//! is not used.
+//! MTL has many careless writers. Under [`MtlMode::Guess`] the values that no one can have meant are replaced, each with a
+//! counted warning; under [`MtlMode::Literal`] the text counts. Both agree on this: colours are linear (the founding texts
+//! know nothing else, and Blender writes them so; [`super::writer`] tells when they are guessed not to be) and pictures
+//! sRGB-coded; surfaces are seen from both sides; `illum` 3 and above mirror by `Ks`, of these 4, 6, 7 and 9 are
+//! transparent and let through what they do not mirror, 5 and 7 have Fresnel's balance; a material with fields of
+//! physically based rendering (`Pr`, `Pm`, …) is one, and its `Ks` is not used.
 //!
 //! The numbers come first ([`Meaning`]), then the pictures ([`super::textures`]): what a factor means may depend on
 //! whether its map could be read.

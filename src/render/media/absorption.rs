@@ -1,10 +1,10 @@
 //! Which materials absorb the light that goes through their inside, and how strongly.
 
-use super::media::{Media, MediaTable};
-use super::optics::transmittance;
-use super::wave::Path;
 use crate::accel::{Hit, Ray};
 use crate::math::Vec3;
+use crate::render::media::{Media, MediaTable};
+use crate::render::optics::transmittance;
+use crate::render::wave::Path;
 use crate::scene::{Material, Reflection};
 
 /// Coefficients of Beer's law by material, 1 / unit of length; empty where nothing absorbs light.
@@ -38,7 +38,7 @@ impl Absorption {
     }
 
     /// A path after what its ray is inside of has absorbed its part of the light up to `hit`.
-    pub(crate) fn lessened(&self, table: &MediaTable, ray: &Ray, path: &Path, hit: &Hit) -> Path {
+    pub(crate) fn attenuated(&self, table: &MediaTable, ray: &Ray, path: &Path, hit: &Hit) -> Path {
         let length = (hit.t - path.since) * ray.dir.length();
         let left = self.within(table, path.media).map_or(Vec3::ONE, |a| transmittance(a, length));
         Path { weight: path.weight * left, since: hit.t, ..*path }

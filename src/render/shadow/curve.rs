@@ -1,10 +1,10 @@
 //! How far the round surface that a triangle's normals describe rises over the triangle, so that the shadow rays of coarse
 //! smooth meshes start where the surface would be and not under it.
 
-use super::shade::Incident;
-use super::surface::Surface;
 use crate::accel::{NO_PRIM, Ray};
 use crate::math::Vec3;
+use crate::render::shade::Incident;
+use crate::render::surface::Surface;
 
 /// Cosine between a light and a triangle from which on shadow rays start on the triangle itself; below it they start the
 /// higher the flatter the light is. Rays towards steeper light leave a rounded mesh in any case.
@@ -12,7 +12,7 @@ pub(crate) const STEEP: f32 = 0.1;
 
 /// The corners of a triangle over each other's tangent planes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Curve {
+pub(in crate::render) struct Curve {
     /// Unit normals of the corners.
     normals: [Vec3; 3],
     /// Of the plane at each corner: the heights of all three over it.
@@ -21,7 +21,7 @@ pub(super) struct Curve {
 
 impl Curve {
     /// The triangle with these corners and unit normals there, all on one side.
-    pub(super) fn new(vertices: [Vec3; 3], normals: [Vec3; 3]) -> Self {
+    pub(in crate::render) fn new(vertices: [Vec3; 3], normals: [Vec3; 3]) -> Self {
         let over = |k: usize| {
             let height = |j: usize| (vertices[j] - vertices[k]).dot(normals[k]);
             Vec3::new(height(0), height(1), height(2))
@@ -33,7 +33,7 @@ impl Curve {
     /// corners' tangent planes, of those that it lies under. Zero at the corners, and where the surface is hollow.
     ///
     /// J. Hanika, "Hacking the Shadow Terminator" (Ray Tracing Gems II, 2021).
-    pub(super) fn lift(&self, weights: [f32; 3]) -> Vec3 {
+    pub(in crate::render) fn lift(&self, weights: [f32; 3]) -> Vec3 {
         let at = Vec3::from(weights);
         let to_plane = |k: usize| self.normals[k] * (weights[k] * (-self.heights[k].dot(at)).max(0.0));
         to_plane(0) + to_plane(1) + to_plane(2)
@@ -60,7 +60,7 @@ impl Surface<'_> {
             let foot = self.origin(self.geometric);
             let lift = lift * (1.0 - cosine / STEEP).min(1.0);
             let start = foot + lift;
-            let (dir, t_max) = incident.way(start);
+            let (dir, t_max) = incident.shadow_segment(start);
             // Its own triangle may be in the way of a ray that starts above it.
             let ray = Ray { origin: start, t_min: 0.0, dir, t_max, exclude: NO_PRIM, sample };
             let riser = Ray { origin: foot, t_min: 0.0, dir: lift, t_max: 1.0, exclude: self.target.prim, sample };
@@ -74,7 +74,7 @@ impl Surface<'_> {
 
     /// The ray from the triangle itself to a light on either side of it.
     pub(crate) fn shadow_ray(&self, incident: &Incident, sample: u32) -> Ray {
-        let (dir, end) = incident.way(self.origin(incident.to_light));
+        let (dir, end) = incident.shadow_segment(self.origin(incident.to_light));
         self.ray(dir, end, sample)
     }
 

@@ -1,12 +1,12 @@
 //! Asking a structure what rays hit, in slices, so that a user who gives up need not wait for a whole wave.
 
 use super::Progress;
-use super::filters::Through;
 use super::observer::{Observer, Question};
+use super::shadow::filters::ShadowFilter;
 use crate::accel::{Accel, Hit, HitQueries, IntersectFilter, OccludedFilter, Ray};
 
 /// A structure, one worker's scratch for it, and the progress by which a user may cancel.
-pub(crate) struct Asking<'a, A: Accel> {
+pub(crate) struct RayCaster<'a, A: Accel> {
     accel: &'a A,
     scratch: A::Scratch,
     progress: &'a dyn Progress,
@@ -14,7 +14,7 @@ pub(crate) struct Asking<'a, A: Accel> {
     pub cancelled: bool,
 }
 
-impl<'a, A: Accel> Asking<'a, A> {
+impl<'a, A: Accel> RayCaster<'a, A> {
     pub(crate) fn new(accel: &'a A, progress: &'a dyn Progress) -> Self {
         Self { accel, scratch: accel.scratch(), progress, cancelled: false }
     }
@@ -35,8 +35,8 @@ impl<'a, A: Accel> Asking<'a, A> {
             let part = start..start + hits.len();
             let (rays, after) = (&queries.rays[part.clone()], queries.after.map(|after| &after[part.clone()]));
             let pencil = queries.pencil.map(|pencil| pencil.part(part));
-            let since = queries.filter.map(|filter| Since { filter, start });
-            let filter = since.as_ref().map(|since| since as &dyn IntersectFilter);
+            let offset = queries.filter.map(|filter| OffsetFilter { filter, start });
+            let filter = offset.as_ref().map(|offset| offset as &dyn IntersectFilter);
             probe.asked(question, rays, after.unwrap_or_default());
             let queries = HitQueries { rays, pencil: pencil.as_ref(), after, filter };
             self.accel.first_hits(&queries, hits, &mut self.scratch, probe);
@@ -50,31 +50,31 @@ impl<'a, A: Accel> Asking<'a, A> {
     }
 
     /// Whether anything opaque is hit by each ray.
-    pub(crate) fn occluded<P: Observer>(&mut self, rays: &[Ray], blocked: &mut [bool], probe: &mut P) {
-        self.occluded_filtered(rays, None, blocked, probe);
+    pub(crate) fn occluded<P: Observer>(&mut self, rays: &[Ray], occluded: &mut [bool], probe: &mut P) {
+        self.occluded_filtered(rays, None, occluded, probe);
     }
 
     /// Whether anything opaque is hit by each ray, or anything else where it stops light.
-    pub(crate) fn stopped<P: Observer>(&mut self, through: &Through, blocked: &mut [bool], probe: &mut P) {
-        self.occluded_filtered(through.rays, Some(through), blocked, probe);
+    pub(crate) fn stopped<P: Observer>(&mut self, shadow_filter: &ShadowFilter, occluded: &mut [bool], probe: &mut P) {
+        self.occluded_filtered(shadow_filter.rays, Some(shadow_filter), occluded, probe);
     }
 
     fn occluded_filtered<P: Observer>(
         &mut self,
         rays: &[Ray],
-        through: Option<&Through>,
-        blocked: &mut [bool],
+        shadow_filter: Option<&ShadowFilter>,
+        occluded: &mut [bool],
         probe: &mut P,
     ) {
-        let slices = rays.chunks(P::SLICE).zip(blocked.chunks_mut(P::SLICE));
-        for (start, (rays, blocked)) in (0..).step_by(P::SLICE).zip(slices) {
+        let slices = rays.chunks(P::SLICE).zip(occluded.chunks_mut(P::SLICE));
+        for (start, (rays, occluded)) in (0..).step_by(P::SLICE).zip(slices) {
             if self.gives_up() {
                 return;
             }
             probe.asked(Question::Occluded, rays, &[]);
-            let part = through.map(|through| through.part(start..start + rays.len()));
+            let part = shadow_filter.map(|shadow_filter| shadow_filter.part(start..start + rays.len()));
             let filter = part.as_ref().map(|part| part as &dyn OccludedFilter);
-            self.accel.occluded_filtered(rays, filter, blocked, &mut self.scratch, probe);
+            self.accel.occluded_filtered(rays, filter, occluded, &mut self.scratch, probe);
             probe.answered(&[]);
         }
     }
@@ -86,12 +86,12 @@ impl<'a, A: Accel> Asking<'a, A> {
 }
 
 /// What is known of rays from one on.
-struct Since<'a> {
+struct OffsetFilter<'a> {
     filter: &'a dyn IntersectFilter,
     start: usize,
 }
 
-impl IntersectFilter for Since<'_> {
+impl IntersectFilter for OffsetFilter<'_> {
     fn rejects(&self, ray: usize, prim: u32) -> bool {
         self.filter.rejects(self.start + ray, prim)
     }

@@ -32,42 +32,42 @@ impl ShadingBatch {
     }
 
     /// Of each point that is shaded here: the place in what was traced of its ray, its sample, and what layers of a
-    /// picture tell of it, whose material is `even` but for maps.
+    /// picture tell of it, whose material is `unmapped` but for maps.
     pub(crate) fn firsts(
         &self,
         instance: u32,
-        even: &Bsdf,
+        unmapped: &Bsdf,
         center: DVec3,
     ) -> impl Iterator<Item = (usize, u32, FirstSurface)> {
         let prims = self.given.faces.prims();
         self.certain().map(move |i| {
             let at = (get(&self.found.position, i), get(&self.found.normal, i));
-            let albedo = self.bare(i, even, true).model.base();
+            let albedo = self.base_bsdf(i, unmapped, true).model.base();
             (self.rays[i] as usize, self.samples[i], FirstSurface::new((prims[i], instance), at, albedo, center))
         })
     }
 
-    /// The material at point `i`, which is `even` where maps do not change it, but for its lobes.
-    pub(super) fn bare(&self, i: usize, even: &Bsdf, outside: bool) -> Bsdf {
+    /// The material at point `i`, which is `unmapped` where maps do not change it, but for its lobes.
+    pub(super) fn base_bsdf(&self, i: usize, unmapped: &Bsdf, outside: bool) -> Bsdf {
         if self.painted.any {
-            return Bsdf::bare(self.painted.model(i, &even.model), self.painted.emission(i), outside);
+            return Bsdf::base_layer(self.painted.model(i, &unmapped.model), self.painted.emission(i), outside);
         }
-        Bsdf::bare(even.model, even.emission, outside)
+        Bsdf::base_layer(unmapped.model, unmapped.emission, outside)
     }
 
     /// The ground at point `i` of this material, by number too, the back of which is seen from inside if it `has_inside`.
-    pub(crate) fn ground<'a>(&'a self, i: usize, material: (u32, &'a Material), has_inside: bool) -> BatchPoint<'a> {
+    pub(crate) fn point<'a>(&'a self, i: usize, material: (u32, &'a Material), has_inside: bool) -> BatchPoint<'a> {
         BatchPoint { batch: self, i, material, outside: self.found.front[i] == 1 || !has_inside }
     }
 }
 
 impl BatchPoint<'_> {
-    /// The material there, which is `even` where maps do not change it, under what lies over it.
-    pub(crate) fn covered(&self, even: &Bsdf) -> Bsdf {
-        let bare = self.batch.bare(self.i, even, self.outside);
+    /// The material there, which is `unmapped` where maps do not change it, under what lies over it.
+    pub(crate) fn bsdf(&self, unmapped: &Bsdf) -> Bsdf {
+        let base_bsdf = self.batch.base_bsdf(self.i, unmapped, self.outside);
         match self.batch.overlays.as_ref().filter(|over| over.any()) {
-            Some(over) => bare.under(over.at(self.i)),
-            None => bare,
+            Some(over) => base_bsdf.under(over.at(self.i)),
+            None => base_bsdf,
         }
     }
 }

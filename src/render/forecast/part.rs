@@ -1,21 +1,21 @@
 //! A part of a picture that tells about the whole: small squares of its pixels, spread evenly.
 
-use super::by_class::ByClass;
-use super::certainty::output;
-use super::context::Context;
-use super::observer::Observer;
-use super::sampling::{ErrorSpace, Sampling};
-use super::tile::{Alone, TILE, Tile, TilePixels, render_some};
-use super::{Job, Progress, Settings};
 use crate::accel::RayCounts;
 use crate::image::{Developer, Picture};
 use crate::math::Vec3;
+use crate::render::by_class::ByClass;
+use crate::render::certainty::output;
+use crate::render::context::Context;
+use crate::render::observer::Observer;
+use crate::render::sampling::{ErrorSpace, Sampling};
+use crate::render::tile::{Alone, TILE, Tile, TilePixels, render_some};
+use crate::render::{Job, Progress, Settings};
 use crate::scene::Background;
 use std::collections::BTreeSet;
 use std::time::Duration;
 
 /// Columns and rows of a square.
-pub(super) const SIDE: u32 = 8;
+pub(in crate::render) const SIDE: u32 = 8;
 
 /// One square in so many is looked at.
 const ONE_IN: usize = 100;
@@ -24,7 +24,7 @@ const ONE_IN: usize = 100;
 const LEAST: usize = 128;
 
 /// Squares of a picture of this size: all of them where it is small.
-pub(super) fn squares(width: u32, height: u32) -> Vec<Tile> {
+pub(in crate::render) fn squares(width: u32, height: u32) -> Vec<Tile> {
     let (columns, rows) = (width.div_ceil(SIDE), height.div_ceil(SIDE));
     let all = columns as usize * rows as usize;
     let wanted = (all / ONE_IN).max(LEAST);
@@ -56,7 +56,7 @@ fn spread(k: u32, columns: u32, rows: u32) -> (u32, u32) {
 }
 
 /// What came of the squares of a picture, in their order.
-pub(super) struct Part<P> {
+pub(in crate::render) struct Part<P> {
     pub squares: Vec<TilePixels>,
     /// Time of the processor for each.
     pub spent: Vec<Duration>,
@@ -66,7 +66,7 @@ pub(super) struct Part<P> {
 
 impl<P: Observer> Part<P> {
     /// Renders them in a context that was made for these settings but for their seed; `None` when cancelled.
-    pub(super) fn render(
+    pub(in crate::render) fn render(
         job: &Job,
         context: &Context,
         settings: &Settings,
@@ -92,14 +92,14 @@ impl<P: Observer> Part<P> {
 
     /// Eye rays that a square would take as a part of whole tiles. Of the pixels around it a square has more, for its size, than
     /// a tile, and of the first rays through these a tile traces none.
-    pub(super) fn rays_in_tiles(&self, square: usize) -> f64 {
+    pub(in crate::render) fn rays_in_tiles(&self, square: usize) -> f64 {
         let square = &self.squares[square];
         let around = square.rays_around as f64 * (1.0 - f64::from(SIDE) / f64::from(TILE));
         (square.rays - square.rays_beyond) as f64 - around
     }
 
     /// Processor time that it would take so.
-    pub(super) fn seconds_in_tiles(&self, square: usize) -> f64 {
+    pub(in crate::render) fn seconds_in_tiles(&self, square: usize) -> f64 {
         self.spent[square].as_secs_f64() * self.kept_in_tiles(square)
     }
 
@@ -109,26 +109,26 @@ impl<P: Observer> Part<P> {
     }
 
     /// Processor time that all took.
-    pub(super) fn seconds(&self) -> f64 {
+    pub(in crate::render) fn seconds(&self) -> f64 {
         self.spent.iter().map(Duration::as_secs_f64).sum()
     }
 
     /// Processor time of a pixel as a part of whole tiles, on the average.
-    pub(super) fn seconds_per_pixel(&self) -> f64 {
+    pub(in crate::render) fn seconds_per_pixel(&self) -> f64 {
         let seconds: f64 = (0..self.squares.len()).map(|i| self.seconds_in_tiles(i)).sum();
         seconds / self.pixels().max(1) as f64
     }
 
     /// Samples of each, on the average.
     #[expect(clippy::cast_precision_loss, reason = "counts of rays")]
-    pub(super) fn samples_per_pixel(&self) -> f64 {
+    pub(in crate::render) fn samples_per_pixel(&self) -> f64 {
         let samples =
             self.squares.iter().flat_map(|square| &square.facts).map(|facts| u64::from(facts.count)).sum::<u64>();
         samples as f64 / self.pixels().max(1) as f64
     }
 
     /// Eye rays.
-    pub(super) fn rays(&self) -> u64 {
+    pub(in crate::render) fn rays(&self) -> u64 {
         self.squares.iter().map(|square| square.rays).sum()
     }
 }
@@ -141,12 +141,12 @@ impl Part<RayCounts> {
     }
 
     /// Those that it would take as a part of whole tiles.
-    pub(super) fn tests_in_tiles(&self, square: usize) -> f64 {
+    pub(in crate::render) fn tests_in_tiles(&self, square: usize) -> f64 {
         self.tests(square) as f64 * self.kept_in_tiles(square)
     }
 
     /// Tests of an eye ray and all that come of it, on the average.
-    pub(super) fn tests_per_ray(&self) -> f64 {
+    pub(in crate::render) fn tests_per_ray(&self) -> f64 {
         let tests: u64 = (0..self.squares.len()).map(|i| self.tests(i)).sum();
         tests as f64 / self.rays().max(1) as f64
     }
@@ -154,7 +154,7 @@ impl Part<RayCounts> {
 
 /// Squared error of one of two renderings that have only noise in which to differ, for each square: the sum over its pixels,
 /// and how many these are.
-pub(super) fn squared_errors<P, Q>(measure: &Measure, a: &Part<P>, b: &Part<Q>) -> Vec<(f64, f64)> {
+pub(in crate::render) fn squared_errors<P, Q>(measure: &Measure, a: &Part<P>, b: &Part<Q>) -> Vec<(f64, f64)> {
     let of_square = |(a, b): (&TilePixels, &TilePixels)| {
         let pixels = a.beauty.len() as f64;
         (0.5 * measure.mean_square(a.into(), b.into()) * pixels, pixels)
@@ -163,7 +163,7 @@ pub(super) fn squared_errors<P, Q>(measure: &Measure, a: &Part<P>, b: &Part<Q>) 
 }
 
 /// The numbers in which errors of a picture are counted.
-pub(super) struct Measure {
+pub(in crate::render) struct Measure {
     output: Option<crate::image::Output>,
     background: Option<Vec3>,
     /// 3, or 4 with coverage where the picture has no background.
@@ -172,7 +172,7 @@ pub(super) struct Measure {
 
 impl Measure {
     /// The numbers of a scene; of stochastic sampling its own, else those of the displayed picture.
-    pub(super) fn of(job: &Job) -> Self {
+    pub(in crate::render) fn of(job: &Job) -> Self {
         let space = match job.settings.sampling {
             Sampling::Stochastic(how) => how.space,
             _ => ErrorSpace::default(),
@@ -183,7 +183,7 @@ impl Measure {
     }
 
     /// Mean over pixels and channels of the squared difference of two pictures.
-    pub(super) fn mean_square(&self, a: Shown, b: Shown) -> f64 {
+    pub(in crate::render) fn mean_square(&self, a: Shown, b: Shown) -> f64 {
         let developer = self.output.as_ref().map(Developer::new);
         let behind = self.background.unwrap_or(Vec3::ZERO).extend(1.0).to_array();
         let written = |shown: Shown, at: usize| {
@@ -210,7 +210,7 @@ impl Measure {
 
 /// What pixels show: [`Picture::beauty`], and [`Picture::veil`] where there is any.
 #[derive(Clone, Copy)]
-pub(super) struct Shown<'a> {
+pub(in crate::render) struct Shown<'a> {
     pub beauty: &'a [[f32; 4]],
     pub veil: &'a [[f32; 4]],
 }
@@ -228,7 +228,7 @@ impl<'a> From<&'a TilePixels> for Shown<'a> {
 }
 
 /// Hears whether to stop, and tells no more than that there is work before that on the picture.
-pub(super) struct Quiet<'a>(pub &'a dyn Progress);
+pub(in crate::render) struct Quiet<'a>(pub &'a dyn Progress);
 
 impl Progress for Quiet<'_> {
     fn tiles(&self, _done: usize, _total: usize) {

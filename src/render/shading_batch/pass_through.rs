@@ -7,7 +7,7 @@ use super::constants::MaterialConstants;
 
 /// What a ray that goes on behind a point has passed there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Passed {
+pub(crate) enum PassThrough {
     /// The back of a face that is seen from its front alone.
     Back,
     /// A surface of which so much is seen, less than 1.
@@ -19,33 +19,34 @@ impl ShadingBatch {
     /// rays pass, these by their places in what was traced; `reads` says that maps or vertices were read.
     pub(crate) fn thin_out(
         &mut self,
-        (common, reads): (&MaterialConstants, bool),
-        mut tell: impl FnMut(usize, Passed),
+        (constants, reads): (&MaterialConstants, bool),
+        mut tell: impl FnMut(usize, PassThrough),
     ) {
         let Self { count, rays, weights, found, painted, .. } = self;
-        let (count, covered) = ((*count).min(POINTS), &painted.covered);
+        let (count, coverage) = ((*count).min(POINTS), &painted.coverage);
         // Mostly there is nothing to do.
-        let fronts = !common.one_sided || found.front[..count].iter().fold(1, |all, front| all & front) == 1;
-        let whole = if reads { covered[..count].iter().all(|&covered| covered >= 1.0) } else { common.covered >= 1.0 };
-        if fronts && whole {
+        let fronts = !constants.one_sided || found.front[..count].iter().fold(1, |all, front| all & front) == 1;
+        let opaque =
+            if reads { coverage[..count].iter().all(|&coverage| coverage >= 1.0) } else { constants.coverage >= 1.0 };
+        if fronts && opaque {
             return;
         }
         for i in 0..count {
             if found.certain[i] != 1 {
                 continue;
             }
-            let passed = if common.one_sided && found.front[i] == 0 {
-                Passed::Back
+            let passed = if constants.one_sided && found.front[i] == 0 {
+                PassThrough::Back
             } else {
-                Passed::Covered(if reads { covered[i] } else { common.covered })
+                PassThrough::Covered(if reads { coverage[i] } else { constants.coverage })
             };
             match passed {
-                Passed::Covered(1.0..) => continue,
-                Passed::Covered(part) if part > 0.0 => {
+                PassThrough::Covered(1.0..) => continue,
+                PassThrough::Covered(part) if part > 0.0 => {
                     let weights = weights.get_or_insert(ONES);
                     put(weights, i, get(weights, i) * part);
                 }
-                Passed::Covered(_) | Passed::Back => found.certain[i] = 0,
+                PassThrough::Covered(_) | PassThrough::Back => found.certain[i] = 0,
             }
             tell(rays[i] as usize, passed);
         }

@@ -17,19 +17,19 @@ pub(super) fn assemble(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Vec
         return vec![(0, cloud(geometry, soup, placed))];
     }
     let mut of_run: BTreeMap<u32, Vec<(WireStatement, &[Corner])>> = BTreeMap::new();
-    let mut rest = soup.stroke_corners.as_slice();
-    for stroke in &geometry.strokes {
-        let (corners, after) = rest.split_at(stroke.arity as usize);
+    let mut rest = soup.wire_corners.as_slice();
+    for wire in &geometry.wire_statements {
+        let (corners, after) = rest.split_at(wire.arity as usize);
         rest = after;
-        of_run.entry(stroke.run).or_default().push((*stroke, corners));
+        of_run.entry(wire.run).or_default().push((*wire, corners));
     }
     if of_run.is_empty() {
         return Vec::new();
     }
     let mut vertices = Pairs::new(soup.positions.len());
-    let mut build = |(run, strokes): (u32, Vec<(WireStatement, &[Corner])>)| {
+    let mut build = |(run, wire_statements): (u32, Vec<(WireStatement, &[Corner])>)| {
         vertices.clear();
-        let mut wires = wires(&strokes, soup, placed, &mut vertices);
+        let mut wires = wires(&wire_statements, soup, placed, &mut vertices);
         wires.mesh.name = name(geometry, run);
         (run, wires)
     };
@@ -60,13 +60,18 @@ fn normals(mut normals: Vec<Vec3>) -> Vec<Vec3> {
     normals
 }
 
-fn wires(strokes: &[(WireStatement, &[Corner])], soup: &Soup, placed: &Placed, vertices: &mut Pairs<Key>) -> Wires {
+fn wires(
+    wire_statements: &[(WireStatement, &[Corner])],
+    soup: &Soup,
+    placed: &Placed,
+    vertices: &mut Pairs<Key>,
+) -> Wires {
     let mut ends = Vec::new();
     let mut numbers = Vec::new();
-    for (stroke, corners) in strokes {
+    for (wire, corners) in wire_statements {
         numbers.clear();
         numbers.extend(corners.iter().map(|c| vertices.number(c.position, (c.uv, c.normal))));
-        if stroke.joined {
+        if wire.joined {
             ends.extend(numbers.windows(2).map(|pair| [pair[0], pair[1]]));
         } else {
             ends.extend(numbers.iter().map(|&number| [number; 2]));

@@ -10,7 +10,7 @@
 use super::Face;
 use super::pairs::Pairs;
 use super::soup::{NONE, Soup};
-use crate::load::smooth::angle;
+use crate::load::smooth_normals::angle;
 use crate::math::ear_clip::newell;
 use crate::math::{DVec3, Vec3};
 

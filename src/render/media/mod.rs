@@ -1,6 +1,10 @@
 //! The substances that rays are inside of, and what happens at their boundaries.
 
+pub(super) mod absorption;
+pub(super) mod around_eye;
+
 use super::sobol::mix;
+use std::collections::HashMap;
 
 /// One substance a ray is inside of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -12,7 +16,7 @@ pub(crate) struct Medium {
 }
 
 /// The substances a ray is inside of: a list in the [`MediaTable`] of the worker that traces it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Media(u32);
 
 impl Media {
@@ -50,6 +54,10 @@ pub(crate) struct MediaTable {
     /// Where each list is found by what it holds: the first free slot from the one that its hash names. At most half of them are
     /// taken, of a power of two.
     slots: Vec<Media>,
+    /// That in which rays start.
+    start: Media,
+    /// It is not asked which lists are held while there are fewer.
+    limit: usize,
 }
 
 /// A substance that was entered from within another list.
@@ -71,17 +79,53 @@ impl MediaTable {
     const EMPTY_SPACE: f32 = 1.0;
     /// Slots of a table that is not empty.
     const LEAST: usize = 16;
-    /// Substances of a list at most, so that what is entered again and again and never left takes no more time with each.
-    /// What is entered then is the only one.
-    const MOST: u32 = 64;
+    /// Substances of a list at most, so that what is entered again and again and never left takes no more time with each: more
+    /// than rays bounce. What is entered then is the only one.
+    const MOST: u32 = 512;
+    /// Lists that are made before those that no ray holds any more are forgotten.
+    const MANY: usize = 1 << 14;
+
+    /// Whether so many lists were made that it is worth asking which of them rays still hold.
+    pub(crate) fn is_large(&self) -> bool {
+        self.lists.len() >= self.limit.max(Self::MANY)
+    }
+
+    /// Forgets all lists but those that rays hold, all of which are in `held`, and the one in which rays start, which stays what
+    /// it is.
+    pub(crate) fn retain<'m>(&mut self, held: impl Iterator<Item = &'m mut Media>) {
+        let all = std::mem::take(self);
+        // By number, the list as it is called from now on.
+        let mut renamed = HashMap::new();
+        // What was made first is made first again.
+        self.start = self.adopt(&all, all.start, &mut renamed);
+        debug_assert_eq!(self.start, all.start);
+        for media in held {
+            *media = self.adopt(&all, *media, &mut renamed);
+        }
+        self.limit = 2 * self.lists.len();
+    }
+
+    /// Makes a list as it is in another table, and those it goes on from, unless that was done.
+    fn adopt(&mut self, other: &Self, media: Media, renamed: &mut HashMap<Media, Media>) -> Media {
+        let Some(&list) = other.list(media) else { return Media::OUTSIDE };
+        if let Some(&made) = renamed.get(&media) {
+            return made;
+        }
+        let outer = self.adopt(other, list.outer, renamed);
+        let made = self.find_or_make(List { outer, ..list });
+        renamed.insert(media, made);
+        made
+    }
 
     /// Forgets all lists but that of these substances, the innermost last, in which rays start.
     pub(crate) fn reset(&mut self, start: &[Medium]) -> Media {
         if !self.lists.is_empty() {
             self.lists.clear();
             self.slots.clear();
+            self.limit = 0;
         }
-        start.iter().fold(Media::OUTSIDE, |media, &medium| self.enter(media, medium))
+        self.start = start.iter().fold(Media::OUTSIDE, |media, &medium| self.enter(media, medium));
+        self.start
     }
 
     fn list(&self, media: Media) -> Option<&List> {
@@ -155,12 +199,17 @@ impl MediaTable {
 
     /// The indices on both sides of the surface of `medium`, and the media beyond it, for a ray that comes from within `media`.
     pub(crate) fn cross(&mut self, media: Media, medium: Medium, entering: bool) -> Crossing {
-        let here = self.ior(media);
+        let innermost = self.innermost(media);
+        let here = innermost.map_or(Self::EMPTY_SPACE, |medium| medium.ior);
         if entering {
             return Crossing { n_i: here, n_t: medium.ior, beyond: self.enter(media, medium) };
         }
         match self.leave(media, medium.material) {
-            Some(beyond) => Crossing { n_i: here, n_t: self.ior(beyond), beyond },
+            Some(beyond) => {
+                // White light that starts inside has the index of one wavelength, and is split where it leaves.
+                let is_innermost = innermost.is_some_and(|innermost| innermost.material == medium.material);
+                Crossing { n_i: if is_innermost { medium.ior } else { here }, n_t: self.ior(beyond), beyond }
+            }
             None => Crossing { n_i: medium.ior, n_t: here, beyond: media },
         }
     }
@@ -252,6 +301,53 @@ mod tests {
             held.reverse();
             assert_eq!(held, *list);
         }
+    }
+
+    #[test]
+    fn lists_that_no_ray_holds_are_forgotten_and_the_others_stay_what_they_are() {
+        let (mut random, mut table) = (Random::new(7), MediaTable::default());
+        let medium = |material: usize| Medium { material: material as u32, ior: 1.5 };
+        let walk = |table: &mut MediaTable, random: &mut Random| {
+            let mut media = Media::OUTSIDE;
+            for _ in 0..20 {
+                media = table.cross(media, medium(random.below(40)), random.below(3) > 0).beyond;
+            }
+            media
+        };
+        let held = |table: &MediaTable, mut media: Media| {
+            let mut all = Vec::new();
+            while let Some(list) = table.list(media) {
+                all.push((list.innermost, list.len));
+                media = list.outer;
+            }
+            all
+        };
+        let start = table.reset(&[medium(41), medium(3), medium(41)]);
+        let mut rays: Vec<Media> = (0..100).map(|_| walk(&mut table, &mut random)).collect();
+        while !table.is_large() {
+            walk(&mut table, &mut random);
+        }
+        rays.extend([Media::OUTSIDE, rays[3], start]);
+        let before: Vec<_> = rays.iter().map(|&media| held(&table, media)).collect();
+        table.retain(rays.iter_mut());
+        assert!(table.lists.len() < 2000 && !table.is_large(), "{}", table.lists.len());
+        assert!(rays.iter().map(|&media| held(&table, media)).eq(before));
+        assert_eq!((rays[101], rays[102]), (rays[3], start));
+        // What is made anew is found where it is.
+        let lists = table.lists.len();
+        let left = table.list(rays[5]).unwrap();
+        let (innermost, outer) = (left.innermost, left.outer);
+        assert_eq!((table.enter(outer, innermost), table.lists.len()), (rays[5], lists));
+    }
+
+    #[test]
+    fn white_light_that_starts_inside_leaves_with_the_index_of_its_part_of_the_spectrum() {
+        let mut table = MediaTable::default();
+        let within = table.reset(&[WATER, GLASS]);
+        let blue = Medium { ior: 1.53, ..GLASS };
+        assert_eq!(indices(&table.cross(within, blue, false)), (1.53, 1.33));
+        // The water around it is not what it leaves.
+        assert_eq!(indices(&table.cross(within, WATER, false)), (1.5, 1.5));
     }
 
     #[test]

@@ -6,15 +6,15 @@
 //! about the forecast, and as that is planned to be too large, a third rendering, seldom a fourth, makes it what was asked.
 //! What hardly any ray of either meets is in neither, and nothing here knows of it.
 
-use super::by_class::ByClass;
-use super::context::Context;
-use super::forecast::Interval;
-use super::observer::Observer;
 use super::part::{Measure, Part, squared_errors, squares};
-use super::sampling::{Sampled, Sampling, Stochastic, Targeted};
-use super::tile::{add_channels, render_tiles};
-use super::{ClassCounts, Job, Progress, Rendered, Settings};
 use crate::image::Picture;
+use crate::render::by_class::ByClass;
+use crate::render::context::Context;
+use crate::render::forecast::Interval;
+use crate::render::observer::Observer;
+use crate::render::sampling::{Sampled, Sampling, Stochastic, Targeted};
+use crate::render::tile::{RenderedTiles, add_channels, render_tiles};
+use crate::render::{ClassCounts, Job, Progress, Rendered, Settings};
 use crate::stopwatch::Stopwatch;
 
 /// The first two renderings are planned to leave this part more than what is asked. A forecast from a part of the picture may
@@ -29,7 +29,7 @@ const MENDS: u64 = 4;
 const CLOSE: f64 = 1.02;
 
 /// How a target is reached.
-pub(super) struct Plan<P> {
+pub(in crate::render) struct Plan<P> {
     how: Stochastic,
     /// Fewest samples of a pixel as they were asked for.
     asked: u32,
@@ -107,18 +107,18 @@ impl<P: Observer> Plan<P> {
     }
 
     /// The settings of one of its renderings.
-    pub(super) fn settings(&self, settings: &Settings, number: u64) -> Settings {
+    pub(in crate::render) fn settings(&self, settings: &Settings, number: u64) -> Settings {
         Settings { sampling: Sampling::Stochastic(self.how), seed: seed(settings.seed, number), ..settings.clone() }
     }
 }
 
 /// The seed of the `number`th rendering of a picture; the first has the picture's own.
-pub(super) fn seed(seed: u64, number: u64) -> u64 {
+pub(in crate::render) fn seed(seed: u64, number: u64) -> u64 {
     seed ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15)
 }
 
 /// Finds the error of a pixel that leaves the error of the picture that is asked for. `None` when cancelled.
-pub(super) fn plan<P: Observer>(
+pub(in crate::render) fn plan<P: Observer>(
     job: &Job,
     context: &Context,
     how: &Stochastic,
@@ -183,7 +183,7 @@ fn fewest(samples: f64) -> u32 {
 }
 
 /// Renders until the error of the picture is what was asked; the picture is the mean of several renderings.
-pub(super) fn render<P: Observer>(
+pub(in crate::render) fn render<P: Observer>(
     job: &Job,
     context: &Context,
     how: &Stochastic,
@@ -197,7 +197,7 @@ pub(super) fn render<P: Observer>(
     let mut one = |settings: &Settings| {
         let context = context.resampled(settings);
         progress.begins();
-        let (picture, sampled, more, complete) =
+        let RenderedTiles { picture, sampled, counts: more, complete } =
             render_tiles::<_, P>(&context, job.accel, job.view, settings, progress);
         counts.extend(more);
         Rendered { picture, counts: ClassCounts::default(), sampled, depth: context.depth, complete }

@@ -3,7 +3,7 @@
 mod corners;
 
 use super::*;
-use crate::load::geometry::sound::assert_sound;
+use crate::load::geometry::invariants::assert_sound;
 use crate::load::{Limits, Polygons};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::{Material, Reflection, UpAxis};

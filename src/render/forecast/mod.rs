@@ -1,13 +1,15 @@
 //! What a picture will take and how wrong it will be, foretold from a part of it.
 
+pub(super) mod part;
+pub(super) mod target;
+
 use super::context::Context;
 use super::fireflies::{self, Closely};
-use super::part::{Measure, Part, Quiet, squared_errors, squares};
 use super::sampling::Sampling;
-use super::target;
 use super::{Job, Progress, Settings};
 use crate::accel::{NoProbe, RayCounts};
 use crate::stopwatch::Stopwatch;
+use part::{Measure, Part, Quiet, squared_errors, squares};
 
 /// A number that was estimated, and what it lies between with 95 % confidence.
 #[derive(Clone, Copy, Debug, PartialEq)]

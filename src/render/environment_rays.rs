@@ -10,23 +10,23 @@
 //! Rays are drawn from the cosine around the normal, from the lobe of a rough mirror and from the light of a panorama,
 //! weighted by the balance heuristic (E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997).
 
-use super::Sky;
+use super::branch::ShadingPoint;
+use super::context::Context;
+use super::draws::Draws;
+use super::media::{Media, MediaTable};
+use super::observer::Observer;
+use super::optics::reflect;
+use super::ray_caster::RayCaster;
+use super::shade::{Bsdf, above};
+use super::shadow::{Bound, ShadowQueue};
+use super::sky::Sky;
 use crate::accel::{Accel, Ray};
 use crate::math::Vec3;
-use crate::render::asking::Asking;
-use crate::render::branch::ShadingPoint;
-use crate::render::context::Context;
-use crate::render::draws::Draws;
-use crate::render::media::{Media, MediaTable};
-use crate::render::observer::Observer;
-use crate::render::optics::reflect;
-use crate::render::shade::{Bsdf, above};
-use crate::render::shadow::{Bound, ShadowQueue};
 use std::f32::consts::PI;
 
 /// Ways to draw a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Way {
+enum DirectionSampler {
     /// By the cosine from the normal.
     Cosine,
     /// By the facets of a rough mirror of this α.
@@ -85,11 +85,11 @@ impl EnvironmentRays {
     /// Sends `context.env_rays` rays, half of them each from numbers of its own.
     pub(crate) fn push<G: ShadingPoint>(&mut self, context: &Context, point: &EnvironmentPoint<G>) {
         let seen = point.surface.seen();
-        let lobe = point.bsdf.gloss().map(|roughness| Way::Lobe(roughness * roughness));
-        let light = context.sky.is_map().then_some(Way::Light);
-        let behind = point.bsdf.is_translucent().then_some(Way::Behind);
+        let lobe = point.bsdf.gloss().map(|roughness| DirectionSampler::Lobe(roughness * roughness));
+        let light = context.sky.is_map().then_some(DirectionSampler::Light);
+        let behind = point.bsdf.is_translucent().then_some(DirectionSampler::Behind);
         // The first ones get a ray where there are few; what lies behind is found in no other way.
-        let ways = [Some(Way::Cosine), behind, lobe, light];
+        let samplers = [Some(DirectionSampler::Cosine), behind, lobe, light];
         let count = 1 + u32::from(lobe.is_some()) + u32::from(light.is_some()) + u32::from(behind.is_some());
         let half = context.env_rays.div_ceil(2);
         let view = View::new(seen.normal, seen.view);
@@ -97,17 +97,17 @@ impl EnvironmentRays {
         for _ in 0..2 {
             let spread = draws.spread(half);
             for k in 0..half {
-                let way = ways.iter().flatten().nth((k % count) as usize).unwrap_or(&Way::Cosine);
-                let dir = way.draw(spread.point(k), &context.sky, &view);
+                let sampler = samplers.iter().flatten().nth((k % count) as usize).unwrap_or(&DirectionSampler::Cosine);
+                let dir = sampler.draw(spread.point(k), &context.sky, &view);
                 // Normals and the face itself may not agree on the side.
                 let side =
                     if behind.is_some() && dir.dot(seen.normal) <= 0.0 { -seen.geometric } else { seen.geometric };
                 let (radiance, drawn) = context.sky.drawn(dir);
-                let density = |(i, way): (u32, &Way)| {
+                let density = |(i, sampler): (u32, &DirectionSampler)| {
                     let rays = half / count + u32::from(i < half % count);
-                    rays as f32 * way.density(dir, drawn, &view)
+                    rays as f32 * sampler.density(dir, drawn, &view)
                 };
-                let density: f32 = (0..).zip(ways.iter().flatten()).map(density).sum();
+                let density: f32 = (0..).zip(samplers.iter().flatten()).map(density).sum();
                 let shown = point.bsdf.lit_around(&seen, dir, radiance, context.scene.ambient);
                 let share = shown * point.weight / (2.0 * density);
                 let share = if share.is_finite() { share } else { Vec3::ZERO };
@@ -127,7 +127,7 @@ impl EnvironmentRays {
     pub(crate) fn trace<A: Accel, P: Observer>(
         &mut self,
         (context, media): (&Context, &mut MediaTable),
-        asking: &mut Asking<A>,
+        caster: &mut RayCaster<A>,
         probe: &mut P,
         mut arrive: impl FnMut(u32, Vec3),
     ) {
@@ -137,7 +137,7 @@ impl EnvironmentRays {
         self.arrived.clear();
         self.arrived.resize(self.shares.len(), Vec3::ZERO);
         let arrived = &mut self.arrived;
-        self.shadows.trace((context, media), asking, probe, |tag, light| arrived[tag as usize] += light);
+        self.shadows.trace((context, media), caster, probe, |tag, light| arrived[tag as usize] += light);
         let half = context.env_rays.div_ceil(2) as usize;
         let halves = self.shares.chunks_exact(2 * half).zip(self.arrived.chunks_exact(2 * half));
         for (point, (sent, come)) in self.points.iter().zip(halves) {
@@ -173,7 +173,7 @@ impl View {
     }
 }
 
-impl Way {
+impl DirectionSampler {
     fn draw(self, at: [f32; 2], sky: &Sky, view: &View) -> Vec3 {
         let around = |cosine: f32| {
             let (sin, cos) = libm::sincosf(2.0 * PI * at[1]);
@@ -249,19 +249,24 @@ mod tests {
         let normal = Vec3::new(0.3, -0.5, 0.8).normalize();
         let view = View::new(normal, Vec3::new(0.1, -0.2, 1.0).normalize());
         // ∫ (N·L)² over the hemisphere is 2π/3.
-        for (way, side) in [(Way::Cosine, 1.0), (Way::Lobe(0.5), 1.0), (Way::Lobe(0.9), 1.0), (Way::Behind, -1.0)] {
+        for (sampler, side) in [
+            (DirectionSampler::Cosine, 1.0),
+            (DirectionSampler::Lobe(0.5), 1.0),
+            (DirectionSampler::Lobe(0.9), 1.0),
+            (DirectionSampler::Behind, -1.0),
+        ] {
             let n = 40_000u16;
             let mut sum = 0.0;
             for k in 0..n {
                 let at = [(f32::from(k) + 0.5) / f32::from(n), (f32::from(k) * 0.618_034).fract()];
-                let dir = way.draw(at, &sky, &view);
-                let density = way.density(dir, 0.0, &view);
+                let dir = sampler.draw(at, &sky, &view);
+                let density = sampler.density(dir, 0.0, &view);
                 if density > 0.0 {
                     sum += f64::from((side * normal.dot(dir)).max(0.0).powi(2) / density);
                 }
             }
             let mean = sum / f64::from(n) / (2.0 / 3.0 * std::f64::consts::PI);
-            assert!((mean - 1.0).abs() < 0.03, "{way:?}: {mean}");
+            assert!((mean - 1.0).abs() < 0.03, "{sampler:?}: {mean}");
         }
     }
 }

@@ -1,30 +1,30 @@
 //! What lets light through on the way of shadow rays, and how much.
 //!
 //! While a structure looks for anything in the way of a ray, it asks of what is not opaque whether it stops the ray's light
-//! ([`Through`]). What does is the answer; holes are passed; all else is noted ([`Met`]) and weakens the light afterwards, in the
-//! order of the hits.
+//! ([`ShadowFilter`]). What does is the answer; holes are passed; all else is noted ([`FilterHits`]) and weakens the light
+//! afterwards, in the order of the hits.
 
-use super::Settings;
-use super::absorption::Absorption;
-use super::context::Context;
-use super::media::{Media, MediaTable, Medium};
-use super::optics::transmittance;
-use super::seam::{is_same_crossing, is_same_surface};
-use super::shade::{Reader, has_inside, shadow_filter};
-use super::surface::{HitPrim, Surface};
-use super::texture::TextureStore;
-use super::world::World;
 use crate::accel::shapes::Prim;
 use crate::accel::{Hit, OccludedFilter, Ray};
 use crate::math::shear::RaySpace;
 use crate::math::{Vec3, triangle};
+use crate::render::Settings;
+use crate::render::context::Context;
+use crate::render::media::absorption::Absorption;
+use crate::render::media::{Media, MediaTable, Medium};
+use crate::render::optics::transmittance;
+use crate::render::seam::{is_same_crossing, is_same_surface};
+use crate::render::shade::{Reader, has_inside, shadow_filter};
+use crate::render::surface::{HitPrim, Surface};
+use crate::render::texture::TextureStore;
+use crate::render::world::World;
 use crate::scene::Scene;
 use std::cell::RefCell;
 use std::ops::Range;
 
 /// What a ray is inside of.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Inside {
+pub(in crate::render) struct RayMedia {
     media: Media,
     /// Up to this t of the ray its light has been lessened by what absorbs it there.
     since: f32,
@@ -32,13 +32,13 @@ pub(super) struct Inside {
 
 /// Weakens light by what a surface lets through at the hit that comes next on its way, behind one that was `crossed`, which it
 /// replaces unless it is a hole. What is to arrive unbent ends at glass, but for the surface that it has left.
-pub(super) fn weaken(
+pub(in crate::render) fn weaken(
     context: &Context,
     (ray, unbent): (&Ray, Option<&Hit>),
     crossed: &mut Hit,
-    Passed { hit, left }: &Passed,
+    FilterHit { hit, left }: &FilterHit,
     light: &mut Vec3,
-    inside: Option<(&mut Inside, &mut MediaTable)>,
+    inside: Option<(&mut RayMedia, &mut MediaTable)>,
 ) {
     if unbent.is_some_and(|left| hit.t <= left.t && is_same_surface(|prim| context.face(prim), ray, left, hit)) {
         return;
@@ -67,13 +67,13 @@ pub(super) fn weaken(
 
 /// Something that light passes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Passed {
+pub(in crate::render) struct FilterHit {
     pub hit: Hit,
     /// What part of it is left behind that, where it is known: neither nothing nor all.
     pub left: Option<f32>,
 }
 
-impl From<Hit> for Passed {
+impl From<Hit> for FilterHit {
     fn from(hit: Hit) -> Self {
         Self { hit, left: None }
     }
@@ -81,51 +81,51 @@ impl From<Hit> for Passed {
 
 /// What lets light through in part, each linked with the one before it of the same ray.
 #[derive(Debug, Default)]
-pub(super) struct Met {
-    passed: Vec<(Passed, u32)>,
+pub(in crate::render) struct FilterHits {
+    passed: Vec<(FilterHit, u32)>,
     /// The last hit of each ray.
     last: Vec<u32>,
 }
 
-impl Met {
+impl FilterHits {
     /// Of rays that have met nothing.
-    pub(super) const NOTHING: u32 = u32::MAX;
+    pub(in crate::render) const NOTHING: u32 = u32::MAX;
     /// Of those that must find it again.
-    pub(super) const TOO_MUCH: u32 = u32::MAX - 1;
+    pub(in crate::render) const OVERFLOW: u32 = u32::MAX - 1;
     /// How much is noted at most: 7 MB of it.
     const MOST: usize = 1 << 18;
 
-    pub(super) fn begin(&mut self, rays: usize) {
+    pub(in crate::render) fn begin(&mut self, rays: usize) {
         self.passed.clear();
         self.last.clear();
         self.last.resize(rays, Self::NOTHING);
     }
 
-    fn note(&mut self, ray: usize, passed: Passed) {
+    fn note(&mut self, ray: usize, passed: FilterHit) {
         let last = &mut self.last[ray];
-        if *last == Self::TOO_MUCH || self.passed.len() >= Self::MOST {
-            *last = Self::TOO_MUCH;
+        if *last == Self::OVERFLOW || self.passed.len() >= Self::MOST {
+            *last = Self::OVERFLOW;
             return;
         }
         // A distance of −0 is none of its own.
         let hit = Hit { t: passed.hit.t + 0.0, ..passed.hit };
-        self.passed.push((Passed { hit, ..passed }, *last));
+        self.passed.push((FilterHit { hit, ..passed }, *last));
         *last = self.passed.len() as u32 - 1;
     }
 
     /// What was last noted of a ray.
-    pub(super) fn last(&self, ray: usize) -> u32 {
+    pub(in crate::render) fn last(&self, ray: usize) -> u32 {
         self.last[ray]
     }
 
     /// What a ray passes, from the last that was noted on, in the order of its way, each once.
-    pub(super) fn list(&self, mut noted: u32, list: &mut Vec<Passed>) {
+    pub(in crate::render) fn list(&self, mut noted: u32, list: &mut Vec<FilterHit>) {
         list.clear();
         while let Some(&(passed, before)) = self.passed.get(noted as usize) {
             list.push(passed);
             noted = before;
         }
-        list.sort_unstable_by(|Passed { hit: a, .. }, Passed { hit: b, .. }| {
+        list.sort_unstable_by(|FilterHit { hit: a, .. }, FilterHit { hit: b, .. }| {
             a.t.total_cmp(&b.t).then(a.prim.cmp(&b.prim))
         });
         list.dedup_by_key(|passed| (passed.hit.t.to_bits(), passed.hit.prim));
@@ -137,7 +137,7 @@ pub struct Filters<'a>(Context<'a>);
 
 /// What was met on the way of rays that are asked again: room that is used again.
 #[derive(Debug, Default)]
-pub struct Noted(RefCell<Met>);
+pub struct FilterScratch(RefCell<FilterHits>);
 
 impl<'a> Filters<'a> {
     /// `None` where nothing is asked but whether something opaque is in the way.
@@ -147,39 +147,43 @@ impl<'a> Filters<'a> {
     }
 
     /// Whether prims stop some rays.
-    pub fn before<'r>(&'r self, rays: &'r [Ray], noted: &'r mut Noted) -> Through<'r> {
+    pub fn for_rays<'r>(&'r self, rays: &'r [Ray], noted: &'r mut FilterScratch) -> ShadowFilter<'r> {
         noted.0.get_mut().begin(rays.len());
-        Through::new(&self.0, rays, &noted.0)
+        ShadowFilter::new(&self.0, rays, &noted.0)
     }
 }
 
 /// Rays that ask what stops their light, and what they meet that lets some through.
 #[derive(Clone, Copy)]
-pub struct Through<'a> {
+pub struct ShadowFilter<'a> {
     context: &'a Context<'a>,
-    pub(super) rays: &'a [Ray],
+    pub(in crate::render) rays: &'a [Ray],
     /// The number of the first of them.
     first: usize,
-    met: &'a RefCell<Met>,
+    filter_hits: &'a RefCell<FilterHits>,
 }
 
-impl<'a> Through<'a> {
+impl<'a> ShadowFilter<'a> {
     /// All of these rays, for whose hits there is room.
-    pub(super) fn new(context: &'a Context<'a>, rays: &'a [Ray], met: &'a RefCell<Met>) -> Self {
-        Self { context, rays, first: 0, met }
+    pub(in crate::render) fn new(
+        context: &'a Context<'a>,
+        rays: &'a [Ray],
+        filter_hits: &'a RefCell<FilterHits>,
+    ) -> Self {
+        Self { context, rays, first: 0, filter_hits }
     }
 
     /// So many of the rays.
-    pub(super) fn part(&self, rays: Range<usize>) -> Self {
+    pub(in crate::render) fn part(&self, rays: Range<usize>) -> Self {
         Self { first: self.first + rays.start, rays: &self.rays[rays], ..*self }
     }
 
-    fn note(&self, ray: usize, passed: Passed) {
-        self.met.borrow_mut().note(self.first + ray, passed);
+    fn note(&self, ray: usize, passed: FilterHit) {
+        self.filter_hits.borrow_mut().note(self.first + ray, passed);
     }
 }
 
-impl OccludedFilter for Through<'_> {
+impl OccludedFilter for ShadowFilter<'_> {
     fn stops(&self, number: usize, prim: u32) -> bool {
         let (context, ray) = (self.context, &self.rays[number]);
         if let Some(stops) = context.alpha_voids.as_ref().and_then(|alpha_voids| alpha_voids.stops(ray, prim)) {
@@ -198,7 +202,7 @@ impl OccludedFilter for Through<'_> {
         let left = left_behind(context, &HitPrim::new(context.scene, context.world, prim), &hit);
         let is_said = matches!(left, Some(0.0 | 1.0));
         if !is_said {
-            self.note(number, Passed { hit, left });
+            self.note(number, FilterHit { hit, left });
         }
         left == Some(0.0)
     }
@@ -213,12 +217,12 @@ fn left_behind(context: &Context, target: &HitPrim, hit: &Hit) -> Option<f32> {
 }
 
 /// What the surface at `hit` lets through. Maps are read at full sharpness: the shadow's own distance is unknown here.
-pub(super) fn filter_at(
+pub(in crate::render) fn filter_at(
     context: &Context,
     target: &HitPrim,
     ray: &Ray,
     hit: &Hit,
-    inside: Option<(&mut Inside, &mut MediaTable)>,
+    inside: Option<(&mut RayMedia, &mut MediaTable)>,
 ) -> Vec3 {
     if target.material.is_opaque() && !context.no_prune {
         return Vec3::ZERO;
@@ -235,9 +239,9 @@ pub(super) fn filter_at(
     filter * inside.cross((table, &context.absorption), front, ray, hit)
 }
 
-impl Inside {
+impl RayMedia {
     /// What a ray starts inside of.
-    pub(super) fn of(media: Media) -> Self {
+    pub(in crate::render) fn of(media: Media) -> Self {
         Self { media, since: 0.0 }
     }
 
@@ -274,7 +278,7 @@ mod tests {
     fn left(crossings: &[(f32, u32, bool)]) -> Vec3 {
         let dir = Vec3::new(0.0, 0.0, 2.0);
         let ray = Ray { origin: Vec3::ZERO, t_min: 0.0, dir, t_max: 9.0, exclude: NO_PRIM, sample: 0 };
-        let (mut table, mut inside) = (MediaTable::default(), Inside::of(Media::OUTSIDE));
+        let (mut table, mut inside) = (MediaTable::default(), RayMedia::of(Media::OUTSIDE));
         let absorption = Absorption::from(vec![THIN, DENSE]);
         let cross = |&(t, which, entering): &(f32, u32, bool)| {
             inside.cross((&mut table, &absorption), (which, entering), &ray, &Hit { t, ..Hit::MISS })

@@ -67,7 +67,7 @@ pub struct Query {
     pub counts: RayCounts,
     /// The hit; of a shadow ray that was blocked only the first `prim` found in its way.
     pub hit: Hit,
-    /// Places of the rays that came of it in [`Story::queries`].
+    /// Places of the rays that came of it in [`RayTree::queries`].
     pub children: Vec<usize>,
     /// The light that a shadow ray looks for, an index into the scene's lights.
     pub light: Option<usize>,
@@ -77,7 +77,7 @@ pub struct Query {
 
 /// Everything that was asked for one sample of a pixel.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Story {
+pub struct RayTree {
     /// The eye ray first. A parent comes before its children.
     pub queries: Vec<Query>,
     /// Linear colour of the sample, without the background.
@@ -90,7 +90,7 @@ pub struct Story {
 
 /// Traces one sample (counted from 0) of the pixel in column x and row y, of [`super::Settings::samples`] in each; `None`:
 /// there is no such pixel or sample.
-pub fn tell(job: &Job, pixel: (u32, u32), sample: u32) -> Option<Story> {
+pub fn tell(job: &Job, pixel: (u32, u32), sample: u32) -> Option<RayTree> {
     let settings = &job.settings.fixed();
     let context = Context::new(job.scene, job.world, job.textures, settings);
     let (seen, told) = trace_sample::<_, Listener>(&context, job.accel, job.view, settings, pixel, sample)?;
@@ -113,7 +113,7 @@ pub fn tell(job: &Job, pixel: (u32, u32), sample: u32) -> Option<Story> {
         }
     }
     queries.clear();
-    Some(Story { queries: sorted, radiance: seen.radiance, through: seen.through, depth: context.depth })
+    Some(RayTree { queries: sorted, radiance: seen.radiance, through: seen.through, depth: context.depth })
 }
 
 /// All queries, class by class in the order they were asked.
