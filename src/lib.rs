@@ -160,7 +160,7 @@
 //! | [`stopwatch`] | time on the wall and of the processor |
 //! | [`named`] | kinds whose values have names, as typed and printed |
 //! | [`number`] | numbers as people read them |
-//! | [`pages`] | arrays in large pages |
+//! | [`huge_pages`] | arrays in large pages |
 //! | [`threads`] | worker threads, each on a processor of its own |
 //! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |
 //!
