@@ -12,7 +12,8 @@ pub(super) enum Writer {
     #[default]
     Other,
     /// Writes 0.8 or what was set before as `Kd` under a map that takes its place; `illum` 3 for metals, with how metallic as
-    /// `Ka` and 1000 (1 − roughness)² as `Ns`; colours in linear light.
+    /// `Ka` and 1000 (1 − roughness)² as `Ns`; 6 and 9 for metals and others whose alpha, `d`, is below 1; `Tf` beside fields of
+    /// physically based materials for the share that light passes with, if any does; colours in linear light.
     Blender,
     /// 3ds Max: writes the colour that a map takes the place of.
     Max,

@@ -109,6 +109,12 @@ impl Meaning<'_> {
                 );
                 2
             }
+            Some(9) if self.is_of_blender() => {
+                self.warn("mtl-illum-of-writer", "illum 9 of Blender is blended as d says: it is no glass");
+                2
+            }
+            // A metal that is blended.
+            Some(6) if self.is_of_blender() => 3,
             Some(illum) => illum,
             None => 2,
         }
@@ -231,7 +237,7 @@ impl Meaning<'_> {
         }
         // A filter says nothing of what says in words that it lets nothing pass.
         let says_opaque = opacity >= 1.0 && (self.mtl.d.is_some() || self.mtl.tr.is_some());
-        let filters = filters && (asked || !says_opaque);
+        let filters = (filters && (asked || !says_opaque)) || self.is_glass_of_blender();
         let passes = opacity < 1.0 || filters;
         if self.guessing() {
             let refracts = matches!(illum, 6 | 7) && self.mtl.tf.is_some_and(|tf| tf != [0.0; 3]);
@@ -345,7 +351,9 @@ impl Meaning<'_> {
             Some(pm) => pm,
             None if (self.has_map)(Slot::Metallic) || packed => 1.0,
             None if self.is_metal_of_blender() => {
-                self.warn("mtl-illum-of-writer", "illum 3 of Blender is metal: Ka says how much of one, Ns how smooth");
+                let illum = self.mtl.illum.unwrap_or(3);
+                let text = format!("illum {illum} of Blender is metal: Ka says how much of one, Ns how smooth");
+                self.warn("mtl-illum-of-writer", &text);
                 self.mtl.ka.map_or(1.0, |[metallic, ..]| metallic)
             }
             None => 0.0,
@@ -365,9 +373,19 @@ impl Meaning<'_> {
         }
     }
 
+    /// Whether what Blender means is known better than what its text says.
+    fn is_of_blender(&self) -> bool {
+        self.guessing() && self.writer == Writer::Blender
+    }
+
     /// Whether it is a metal as Blender wrote them before it had fields for them.
     fn is_metal_of_blender(&self) -> bool {
-        self.guessing() && self.writer == Writer::Blender && self.mtl.illum == Some(3) && !self.mtl.is_physical()
+        self.is_of_blender() && matches!(self.mtl.illum, Some(3 | 6)) && !self.mtl.is_physical()
+    }
+
+    /// Whether light passes as Blender writes it beside fields of physically based materials, where any does.
+    fn is_glass_of_blender(&self) -> bool {
+        self.is_of_blender() && self.mtl.is_physical() && self.mtl.tf.is_some_and(|tf| tf != [0.0; 3])
     }
 
     /// `Ps`: white fibres. No field tells their roughness.

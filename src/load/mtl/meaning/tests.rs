@@ -208,6 +208,28 @@ fn metals_of_blender_are_metals() {
 }
 
 #[test]
+fn what_blender_blends_is_no_glass_and_its_glass_is_what_has_a_filter() {
+    let of = |text: &str| guess_of("# Blender 3.6.0 MTL File: 'a.blend'", text, &[]);
+    let (m, warnings) = of("Ns 250\nKa 1 1 1\nKd 0.8 0.8 0.8\nKs 0.5 0.5 0.5\nNi 1.45\nd 0.3\nillum 9");
+    assert_eq!((m.opacity, m.alpha_mode, warnings), (0.3, AlphaMode::Blend, vec!["mtl-illum-of-writer"]));
+    assert_eq!((phong(&m).mirror, phong(&m).transmission), (Vec3::ZERO, Vec3::ZERO));
+    // A metal of which a half is there.
+    let (m, warnings) = of("Ns 10\nKa 1 1 1\nKd 0.8 0.6 0.2\nKs 0.5 0.5 0.5\nNi 1.5\nd 0.5\nillum 6");
+    let metal = m.metal_rough().unwrap();
+    assert_eq!((metal.metallic, metal.transmission, m.alpha_mode), (1.0, 0.0, AlphaMode::Blend));
+    assert_eq!(warnings, ["mtl-illum-of-writer"]);
+
+    let physical = "Ns 1000\nKd 0.9 1 0.9\nKs 0.5 0.5 0.5\nNi 1.45\nd 1\nillum 2\nPr 0.1\nPm 0";
+    let passed = |m: &Material| m.metal_rough().map(|m| (m.transmission, m.thick)).unwrap();
+    assert_eq!(passed(&of(physical).0), (0.0, false));
+    let (m, _) = of(&format!("{physical}\nTf 1 1 1"));
+    assert_eq!((passed(&m), m.base_color), ((1.0, true), Vec3::new(0.9, 1.0, 0.9)));
+    assert_eq!(passed(&of(&format!("{physical}\nTf 0.5 0.5 0.5")).0), (0.5, true));
+    // Others write a white filter of everything.
+    assert_eq!(passed(&guess_of("# another", &format!("{physical}\nTf 1 1 1"), &[]).0), (0.0, false));
+}
+
+#[test]
 fn maps_take_the_place_of_colors_where_they_did_in_the_program_that_wrote_them() {
     let of = |comment: &str, text: &str| guess_of(comment, text, &[Slot::Diffuse]);
     for comment in ["# 3ds Max Wavefront OBJ Exporter", "# Blender MTL File: 'a'", "# Created with AliceVision"] {
