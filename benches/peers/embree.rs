@@ -322,7 +322,7 @@ impl Built<'_> {
                     }
                 }
                 for (lane, answer) in answers.iter_mut().enumerate() {
-                    *answer = if any { blocked(packet.tfar[lane]) } else { packet.answer(lane) };
+                    *answer = if any { occluded(packet.tfar[lane]) } else { packet.answer(lane) };
                 }
             }
         }
@@ -349,7 +349,7 @@ impl Built<'_> {
                     query(self.scene, context, one_at);
                 }
             }
-            *answer = if any { blocked(one.tfar[0]) } else { one.answer(0) };
+            *answer = if any { occluded(one.tfar[0]) } else { one.answer(0) };
         }
     }
 }
@@ -359,7 +359,7 @@ fn verb(any: bool) -> &'static str {
     if any { "Occluded" } else { "Intersect" }
 }
 
-fn blocked(tfar: f32) -> Answer {
+fn occluded(tfar: f32) -> Answer {
     Answer { prim: if tfar < 0.0 { 0 } else { NO_PRIM }, t: 0.0 }
 }
 

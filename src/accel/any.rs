@@ -277,9 +277,9 @@ impl Accel for AnyAccel<'_> {
         let after = queries.after.map_or(hits.len(), <[Hit]>::len);
         assert_eq!([after, hits.len()], [queries.rays.len(); 2], "a hit before and after for each ray");
         if P::SILENT {
-            self.ask(Looks { queries, hits, probe: &mut NoProbe }, scratch);
+            self.ask(FirstHitsQuestion { queries, hits, probe: &mut NoProbe }, scratch);
         } else {
-            self.ask(Looks { queries, hits, probe }, scratch);
+            self.ask(FirstHitsQuestion { queries, hits, probe }, scratch);
         }
     }
 
@@ -300,13 +300,13 @@ impl Accel for AnyAccel<'_> {
     }
 }
 
-struct Looks<'q, P> {
+struct FirstHitsQuestion<'q, P> {
     queries: &'q HitQueries<'q>,
     hits: &'q mut [Hit],
     probe: &'q mut P,
 }
 
-impl<P: Probe> Question for Looks<'_, P> {
+impl<P: Probe> Question for FirstHitsQuestion<'_, P> {
     const SILENT: bool = P::SILENT;
 
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {

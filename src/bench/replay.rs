@@ -86,7 +86,7 @@ impl<'a> Slice<'a> {
 struct Replayer<'a, A: Accel> {
     accel: &'a A,
     filters: Option<&'a Filters<'a>>,
-    noted: FilterScratch,
+    filter_scratch: FilterScratch,
     scratch: A::Scratch,
     hits: [Hit; SLICE],
     occluded: [bool; SLICE],
@@ -94,8 +94,15 @@ struct Replayer<'a, A: Accel> {
 
 impl<'a, A: Accel> Replayer<'a, A> {
     fn new(accel: &'a A, filters: Option<&'a Filters<'a>>) -> Self {
-        let noted = FilterScratch::default();
-        Self { accel, filters, noted, scratch: accel.scratch(), hits: [Hit::MISS; SLICE], occluded: [false; SLICE] }
+        let filter_scratch = FilterScratch::default();
+        Self {
+            accel,
+            filters,
+            filter_scratch,
+            scratch: accel.scratch(),
+            hits: [Hit::MISS; SLICE],
+            occluded: [false; SLICE],
+        }
     }
 
     /// The answers stay where they are, so that nothing else is timed.
@@ -119,7 +126,7 @@ impl<'a, A: Accel> Replayer<'a, A> {
         match slice.question {
             Question::Closest => self.accel.closest(slice.rays, hits, &mut self.scratch, probe),
             Question::Occluded => {
-                let filter = self.filters.map(|filters| filters.for_rays(slice.rays, &mut self.noted));
+                let filter = self.filters.map(|filters| filters.for_rays(slice.rays, &mut self.filter_scratch));
                 let filter = filter.as_ref().map(|filter| filter as &dyn OccludedFilter);
                 self.accel.occluded_filtered(slice.rays, filter, occluded, &mut self.scratch, probe);
             }

@@ -200,7 +200,7 @@ pub(super) fn too_large(effective: &Effective, kind: FileKind, behind: Behind, l
     beyond((settings.width, settings.height), bytes(effective, kind, behind), limit)
 }
 
-/// A picture that takes more memory than is allowed to be judged, when nothing is kept but what its pixels cost.
+/// A fault when judging a picture, of which only what its pixels cost is kept, takes more memory than is allowed.
 pub(super) fn too_large_to_judge((width, height): (u32, u32), limit: u64) -> Option<Diagnostic> {
     /// Light, counts, and both once more of what it is compared with.
     const OF_PIXEL: u64 = 64;

@@ -234,7 +234,7 @@ impl SamplingArgs {
         }
     }
 
-    /// What a picture of points and lines about so many pixels wide is sampled like.
+    /// How a picture of points and lines about so many pixels wide is sampled.
     pub(super) fn of_wires(&self, sampling: Sampling, pixels: f64) -> Sampling {
         match sampling {
             Sampling::Stochastic(how) if self.min_samples.is_none() => {
@@ -245,7 +245,7 @@ impl SamplingArgs {
         }
     }
 
-    /// What a picture that is written as this kind of file, developed like that, is sampled like.
+    /// How a picture that is written as this kind of file, developed like that, is sampled.
     pub(super) fn written(&self, sampling: Sampling, kind: FileKind, output: &Output) -> Sampling {
         let linear = match self.error_space {
             Some(space) => space == SpaceArg::Linear,

@@ -43,7 +43,7 @@ pub(super) fn place(look: &Look, limits: &Limits, loaded: &mut Loaded) -> Result
 #[derive(Clone, Default)]
 pub(super) struct EnvRead(Arc<Mutex<Option<(PathBuf, LoadedPanorama)>>>);
 
-/// Written alike whatever was read: what is asked for is told apart by that ([`up_to_date`](super::up_to_date)).
+/// Written alike whatever was read: requests are told apart by how they are written ([`up_to_date`](super::up_to_date)).
 impl fmt::Debug for EnvRead {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.debug_struct("EnvRead").finish_non_exhaustive()

@@ -16,8 +16,8 @@ pub fn floor(x: f32) -> f32 {
     if x.abs() < WHOLE { below } else { x }
 }
 
-/// The largest integer below one number by itself: with casts, which take less time there, and a choice that is mostly that for
-/// what is not negative.
+/// [`floor`] of one number by itself: with casts, which take less time there, and a choice that mostly falls as for what is not
+/// negative.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "within ±2²³ both casts are exact")]
 pub fn floor_of_one(x: f32) -> f32 {

@@ -235,7 +235,8 @@ pub fn place(ray: &RaySpace, triangle: &Triangle) -> (f32, f32, f32) {
     (t, u, v)
 }
 
-/// The weights of the corners at a distance that [`meet`] found, or [`distance_f64`] with the normal (b − a) × (c − a).
+/// Weights of the second and third corner at the distance and with the normal that [`meet`] found, or at that of
+/// [`distance_f64`] with the normal (b − a) × (c − a).
 ///
 /// Areas in the plane of the triangle, seen along the axis from which they are largest, so that a grazing ray is no worse
 /// than another.

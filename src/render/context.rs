@@ -31,7 +31,7 @@ const ENV_RAYS: u32 = 16;
 pub(super) const SHADOW_LIMIT: usize = 1 << 14;
 /// Rays to the surroundings that wait before they are traced.
 pub(super) const ENVIRONMENT_RAYS_LIMIT: usize = 1 << 15;
-/// Rays behind those of eyes that wait before they are traced.
+/// Rays that follow primary rays and wait before they are traced.
 pub(super) const FOLLOWERS: usize = 1 << 17;
 
 /// Samples of a pixel that share the rays which one sample would send from each point: of stochastic sampling as many as

@@ -172,9 +172,9 @@ impl Sum {
         };
         // A sum of finite parts can still overflow.
         let color = if color.is_finite() { color } else { color.min(Vec3::splat(f32::MAX)).max(Vec3::ZERO) };
-        let covered = 1.0 - clear;
-        let glass = if covered > 0.0 { (1.0 - self.solid * share / covered).clamp(0.0, 1.0) } else { 1.0 };
-        (color.extend(covered).to_array(), veil.extend(glass).to_array())
+        let coverage = 1.0 - clear;
+        let glass = if coverage > 0.0 { (1.0 - self.solid * share / coverage).clamp(0.0, 1.0) } else { 1.0 };
+        (color.extend(coverage).to_array(), veil.extend(glass).to_array())
     }
 }
 

@@ -16,7 +16,7 @@ use crate::scene::TextureRef;
 
 /// Standard deviation of the part of a pixel over which a highlight is spread at least, in widths of the pixel.
 const OF_PIXEL: f32 = 0.25;
-/// That deviation in widths of what one sample stands for.
+/// That deviation at least in widths of what one sample stands for.
 const OF_SAMPLE: f32 = 0.5;
 /// Growth of a cone beyond which it says nothing any more.
 const WIDEST_CONE: f32 = 1.0;

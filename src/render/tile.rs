@@ -130,7 +130,7 @@ pub(super) fn render_some<A: Accel, P: Observer>(
 pub(crate) struct RenderedTiles<P> {
     pub picture: Picture,
     pub sampled: Sampled,
-    /// Those of each thread.
+    /// What each thread counted.
     pub counts: Vec<ByClass<P>>,
     /// Whether nothing was cut short by the user.
     pub complete: bool,
@@ -311,7 +311,7 @@ pub(crate) enum Together {
 /// What came of tiles that were worked on.
 pub(super) struct TracedTiles<T, P> {
     pub finished: Vec<T>,
-    /// Those of each thread.
+    /// What each thread counted.
     pub counts: Vec<ByClass<P>>,
     /// Whether all were finished.
     pub complete: bool,

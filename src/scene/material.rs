@@ -118,7 +118,7 @@ pub struct Phong {
     pub shininess_map: Option<TextureRef>,
     /// Weight of the mirror-reflected ray, linear; zero: no mirror.
     pub mirror: Vec3,
-    /// Weight of the refracted ray (`Tf`), linear, of which no more counts than `mirror` leaves; zero: none.
+    /// Weight of the refracted ray (`Tf`), linear; zero: none. Without `fresnel` no more of it counts than `mirror` leaves.
     pub transmission: Vec3,
     /// `Ni`, index of refraction of the inside; 1 lets rays pass straight.
     pub ior: f32,

@@ -1,4 +1,4 @@
-//! `meshray trace`: the story of a ray.
+//! `meshray trace`: the tree of rays of a sample.
 
 use super::program::{Folder, picture, textured_cube};
 use serde_json::Value;

@@ -27,7 +27,7 @@ pub struct CellMargins {
     pub room: f64,
     /// How far behind the best hit cells are still visited, relative to its distance.
     pub lag: f64,
-    /// How far at least, where an ulp is no fraction of its distance.
+    /// How much farther, where an ulp is no fraction of its distance.
     pub underflow: f64,
     /// How far from the grid's corner a ray may start that is led through cells.
     pub ray_cells: f64,

@@ -28,7 +28,7 @@ impl<'a> Surface<'a> {
         Ray { exclude: hit.prim, ..ray(self.shapes.refine(from, hit).origin(dir), dir) }
     }
 
-    fn is_blocked(&self, ray: &Ray) -> bool {
+    fn is_occluded(&self, ray: &Ray) -> bool {
         let mut occluded = [false];
         self.accel.occluded(&[*ray], &mut occluded, &mut self.accel.scratch(), &mut NoProbe);
         occluded[0]
@@ -97,7 +97,7 @@ fn shadowed(shapes: &Shapes, cell: f32, up: Vec3) -> (usize, usize) {
         let turn = random.unit() * std::f32::consts::TAU;
         let along = up.any_orthonormal_vector() * turn.cos() + up.cross(up.any_orthonormal_vector()) * turn.sin();
         let to_light = (along + up * 0.001_745_3).normalize();
-        dark += usize::from(surface.is_blocked(&surface.leave(&eye, &hit, to_light)));
+        dark += usize::from(surface.is_occluded(&surface.leave(&eye, &hit, to_light)));
     }
     (seen, dark)
 }
@@ -182,7 +182,7 @@ fn leaks(surface: &Surface, center: Vec3, half: Vec3, i: usize, random: &mut Ran
     let same_side = facing * normal.dot(eye.dir) < 0.0;
     // Exactly at an edge behind which a face turns away, it is the outside of that face that is seen.
     let from_inside = normal.dot(eye.dir) > 0.0;
-    from_inside && same_side && facing.abs() > 1e-6 && !surface.is_blocked(&surface.leave(&eye, &hit, to_light))
+    from_inside && same_side && facing.abs() > 1e-6 && !surface.is_occluded(&surface.leave(&eye, &hit, to_light))
 }
 
 /// S3 (starts on a convex mesh).
@@ -247,8 +247,8 @@ fn a_gap_of_sixteen_units_in_the_last_place_is_resolved() {
                 let (low, high) = (surface.closest(&under), surface.closest(&above));
                 let sides = [low.prim < upper_first(&shapes), high.prim >= upper_first(&shapes)];
                 assert_eq!(sides, [true; 2], "tilt {tilt}, gap {gap:e}");
-                assert!(surface.is_blocked(&surface.leave(&under, &low, Vec3::Z)), "tilt {tilt}, gap {gap:e}");
-                assert!(!surface.is_blocked(&surface.leave(&above, &high, Vec3::Z)), "tilt {tilt}, gap {gap:e}");
+                assert!(surface.is_occluded(&surface.leave(&under, &low, Vec3::Z)), "tilt {tilt}, gap {gap:e}");
+                assert!(!surface.is_occluded(&surface.leave(&above, &high, Vec3::Z)), "tilt {tilt}, gap {gap:e}");
             }
         }
     }

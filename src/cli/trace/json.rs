@@ -1,7 +1,7 @@
 //! The tree of rays of a sample as JSON; the schema is described in [`super`].
 
 use super::Told;
-use super::words::{in_world, inside, light, object, place};
+use super::words::{hit_surface, in_world, inside, light, object};
 use crate::accel::probe::{Extent, NodeId, Test, Visit};
 use crate::accel::{Hit, RayCounts};
 use crate::number::hash;
@@ -78,19 +78,19 @@ fn counts(c: &RayCounts) -> Value {
 
 fn hit(told: &Told, query: &Query) -> Value {
     let Hit { t, prim, .. } = query.hit;
-    let Some(place) = place(told.loaded, told.world, query) else { return Value::Null };
+    let Some(hit_surface) = hit_surface(told.loaded, told.world, query) else { return Value::Null };
     if query.question == Question::Occluded {
         return json!({"t": t, "prim": prim, "object": object(&told.loaded.scene, told.world, prim)});
     }
     json!({
         "t": t,
-        "u": place.weights[0],
-        "v": place.weights[1],
+        "u": hit_surface.weights[0],
+        "v": hit_surface.weights[1],
         "prim": prim,
-        "object": place.object,
-        "material": place.material,
-        "position": place.position.to_array(),
-        "normal": place.normal.to_array(),
+        "object": hit_surface.object,
+        "material": hit_surface.material,
+        "position": hit_surface.position.to_array(),
+        "normal": hit_surface.normal.to_array(),
     })
 }
 

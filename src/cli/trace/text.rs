@@ -1,7 +1,7 @@
 //! The tree of rays of a sample as text.
 
 use super::Told;
-use super::words::{goes_on, in_world, inside, light, object, place};
+use super::words::{goes_on, hit_surface, in_world, inside, light, object};
 use crate::accel::probe::{Extent, NodeId, Outcome, Visit};
 use crate::math::{DVec3, Vec3};
 use crate::number::grouped;
@@ -55,7 +55,7 @@ fn headline(told: &Told, query: &Query) -> String {
 }
 
 fn ending(told: &Told, query: &Query) -> String {
-    let Some(place) = place(told.loaded, told.world, query) else {
+    let Some(hit_surface) = hit_surface(told.loaded, told.world, query) else {
         return match query.question {
             Question::Occluded => "nothing in the way stops its light".into(),
             _ if goes_on(&query.after) => "nothing more".into(),
@@ -66,17 +66,20 @@ fn ending(told: &Told, query: &Query) -> String {
         let object = object(&told.loaded.scene, told.world, query.hit.prim);
         return format!("blocked by prim {} of {object} at t {}", query.hit.prim, query.hit.t);
     }
-    let material =
-        if place.material.is_empty() { place.material_number.to_string() } else { format!("'{}'", place.material) };
+    let material = if hit_surface.material.is_empty() {
+        hit_surface.material_number.to_string()
+    } else {
+        format!("'{}'", hit_surface.material)
+    };
     format!(
         "hits prim {} of {}, material {material}, at t {}, u {}, v {}, position {}, normal {}",
         query.hit.prim,
-        place.object,
+        hit_surface.object,
         query.hit.t,
-        place.weights[0],
-        place.weights[1],
-        point(place.position, resolution(told)),
-        vector(place.normal)
+        hit_surface.weights[0],
+        hit_surface.weights[1],
+        point(hit_surface.position, resolution(told)),
+        vector(hit_surface.normal)
     )
 }
 

@@ -25,7 +25,7 @@ pub(super) struct HitSurface<'a> {
 }
 
 /// Where a query's hit lies.
-pub(super) fn place<'a>(loaded: &'a Loaded, world: &World, query: &Query) -> Option<HitSurface<'a>> {
+pub(super) fn hit_surface<'a>(loaded: &'a Loaded, world: &World, query: &Query) -> Option<HitSurface<'a>> {
     let scene = &loaded.scene;
     query.hit.is_some().then(|| {
         let refined = world.refine(&query.ray, &query.hit);

@@ -127,7 +127,7 @@ impl<'a> Run<'a> {
         Ok(Self { bytes: bytes.get(offset..).unwrap_or_default(), stride: format.size(), format })
     }
 
-    /// This accessor with the stride that the view says.
+    /// This run with the stride that the view says.
     fn strided(self, root: &Root, view: Index<buffer::View>) -> Self {
         let stride = root.buffer_views.get(view.value()).and_then(|view| view.byte_stride).map_or(0, |s| s.0);
         Self { stride: if stride > 0 { stride } else { self.stride }, ..self }

@@ -24,11 +24,11 @@ pub(super) struct Textures<'a> {
     known_pictures: HashMap<Picture, u32>,
 }
 
-/// What a bitmap is made of: an image of the file …
+/// What a bitmap is made of: an image of the file, whose alpha may be gloss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Picture {
     pub(super) image: usize,
-    /// The bits of the material's gloss, of which the image's alpha is a part, and which becomes roughness.
+    /// Where its alpha is a part of the material's gloss and becomes roughness: the bits of that gloss.
     gloss: Option<u32>,
 }
 

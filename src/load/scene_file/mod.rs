@@ -31,7 +31,8 @@
 //! specular = 0.5                # colour, default 0
 //! shininess = 50                # exponent, default 1
 //! mirror = 0.3                  # colour: weight of the reflected ray, default 0
-//! transmission = 0.0            # colour: weight of the refracted ray, default 0
+//! transmission = 0.0            # colour: weight of the refracted ray, default 0; without fresnel
+//!                                 # no more than mirror leaves
 //! ior = 1.0                     # number, or a name: "air", "water", "crown glass", "diamond", ...; default 1
 //! fresnel = false               # whether Fresnel balances mirror and transmission
 //! dispersion = 0.0              # 20 / Abbe number, default 0

@@ -194,7 +194,7 @@ pub trait Simd: Lanewise<LANES> {
     fn rows(self, columns: [Self::Lanes; 4]) -> [[f32; 4]; LANES];
     /// To memory in another order: place k gets the lane, 0 to 7, that the `k`th four bits of `order` name.
     fn arrange(self, a: Self::Lanes, order: Order, to: &mut Row);
-    /// Puts eight words in an order.
+    /// Eight words to memory in another order, as [`Self::arrange`] does.
     fn arrange_words(self, words: &[u32; LANES], order: Order, to: &mut [u32; LANES]);
     /// Those of eight numbers that are at these places, by the lowest three bits of each.
     fn among(self, table: &Row, places: &[u32; LANES]) -> Self::Lanes;

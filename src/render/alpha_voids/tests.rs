@@ -128,9 +128,9 @@ fn toward(random: &mut Random, corners: [Vec3; 3], prim: u32) -> (Ray, [f32; 2])
 }
 
 #[test]
-fn what_is_said_to_be_a_gap_is_shaded_as_nothing_and_what_is_said_to_stop_light_does() {
+fn what_is_said_to_be_a_void_is_shaded_as_nothing_and_what_is_said_to_stop_light_does() {
     let mut random = Random::new(17);
-    let (mut all, mut gaps, mut said) = (0, 0, [0; 2]);
+    let (mut all, mut voids, mut said) = (0, 0, [0; 2]);
     for round in 0..12 {
         let scene = scene(&mut random);
         let world = World::new(&scene);
@@ -163,19 +163,20 @@ fn what_is_said_to_be_a_gap_is_shaded_as_nothing_and_what_is_said_to_stop_light_
                 assert!(surface.front || target.material.double_sided, "its back is crossed: {}", what());
                 assert!(hit.t > from, "it may be met once more: {}", what());
                 let reader = Reader { store: &textures, patch: surface.patch.as_ref(), known: &[] };
-                let covered = target.material.alpha_mode.covers(reader.base(target.material).w);
-                assert!(covered <= 0.0, "{covered} of it is there: {}", what());
+                let coverage = target.material.alpha_mode.covers(reader.base(target.material).w);
+                assert!(coverage <= 0.0, "{coverage} of it is there: {}", what());
                 assert!(!target.material.reflection.transmits(), "{}", what());
-                gaps += 1;
+                voids += 1;
             }
             if let Some(stops) = alpha_voids.stops(&ray, prim) {
-                let covered = target.opacity(&hit, &textures).map(|opacity| target.material.alpha_mode.covers(opacity));
-                assert_eq!(covered, Some(f32::from(u8::from(stops))), "{}", what());
+                let coverage =
+                    target.opacity(&hit, &textures).map(|opacity| target.material.alpha_mode.covers(opacity));
+                assert_eq!(coverage, Some(f32::from(u8::from(stops))), "{}", what());
                 said[usize::from(stops)] += 1;
             }
         }
     }
-    assert!(gaps > all / 40 && said.into_iter().all(|count| count > gaps), "of {all} {gaps} and {said:?}");
+    assert!(voids > all / 40 && said.into_iter().all(|count| count > voids), "of {all} {voids} and {said:?}");
 }
 
 #[test]

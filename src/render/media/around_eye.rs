@@ -20,22 +20,22 @@ pub(in crate::render) fn media_around<A: Accel>(context: &Context, accel: &A, vi
         return Vec::new();
     }
     let mut scratch = accel.scratch();
-    let mut left = ways(view).filter_map(|dir| left_along(context, accel, &mut scratch, view, dir));
+    let mut left = directions(view).filter_map(|dir| left_along(context, accel, &mut scratch, view, dir));
     let Some(first) = left.next() else { return Vec::new() };
-    let around = left.fold(first, |around, left| common(&around, left));
+    let around = left.fold(first, |around, left| in_both(&around, left));
     // The first that is left is the innermost.
     let medium = |&material: &u32| Medium { material, ior: index(&context.scene.materials[material as usize]) };
     around.iter().rev().map(medium).collect()
 }
 
 /// Along the view, and all around in the corners of a cube.
-fn ways(view: &View) -> impl Iterator<Item = Vec3> {
+fn directions(view: &View) -> impl Iterator<Item = Vec3> {
     let corner = |i: u32| Vec3::from([0, 1, 2].map(|k| if i >> k & 1 == 1 { 1.0 } else { -1.0 }));
     std::iter::once(view.forward.as_vec3()).chain((0..8).map(corner))
 }
 
 /// What of the first list is in the second, too, as often as it is there: bodies of one material may lie in each other.
-fn common(first: &[u32], mut second: Vec<u32>) -> Vec<u32> {
+fn in_both(first: &[u32], mut second: Vec<u32>) -> Vec<u32> {
     let is_in_both = |material: &&u32| {
         let at = second.iter().position(|other| other == *material);
         at.map(|at| second.swap_remove(at)).is_some()

@@ -4,6 +4,7 @@ pub(super) mod absorption;
 pub(super) mod around_eye;
 
 use super::sobol::mix;
+use crate::scene::MAX_DEPTH;
 use std::collections::HashMap;
 
 /// One substance a ray is inside of.
@@ -51,11 +52,13 @@ impl Crossing {
 #[derive(Debug, Default)]
 pub(crate) struct MediaTable {
     lists: Vec<List>,
-    /// Where each list is found by what it holds: the first free slot from the one that its hash names. At most half of them are
-    /// taken, of a power of two.
+    /// Finds each list by what it holds: it is in the first slot that was free from the one on that its hash names. Their number
+    /// is a power of two, and at most half are taken.
     slots: Vec<Media>,
     /// That in which rays start.
     start: Media,
+    /// What was entered after what is left: a buffer.
+    within: Vec<Medium>,
     /// It is not asked which lists are held while there are fewer.
     limit: usize,
 }
@@ -80,9 +83,9 @@ impl MediaTable {
     /// Slots of a table that is not empty.
     const LEAST: usize = 16;
     /// Substances of a list at most, so that what is entered again and again and never left takes no more time with each: more
-    /// than rays bounce. What is entered then is the only one.
-    const MOST: u32 = 512;
-    /// Lists that are made before those that no ray holds any more are forgotten.
+    /// than an eye may start inside of, and its rays then enter. What is entered then is the only one.
+    const MOST: u32 = 2 * MAX_DEPTH;
+    /// So many lists are made before it is asked which of them no ray holds any more.
     const MANY: usize = 1 << 14;
 
     /// Whether so many lists were made that it is worth asking which of them rays still hold.
@@ -107,17 +110,23 @@ impl MediaTable {
 
     /// Makes a list as it is in another table, and those it goes on from, unless that was done.
     fn adopt(&mut self, other: &Self, media: Media, renamed: &mut HashMap<Media, Media>) -> Media {
-        let Some(&list) = other.list(media) else { return Media::OUTSIDE };
-        if let Some(&made) = renamed.get(&media) {
-            return made;
+        let (mut missing, mut outer) = (Vec::new(), media);
+        let mut made = loop {
+            let Some(&list) = other.list(outer) else { break Media::OUTSIDE };
+            if let Some(&made) = renamed.get(&outer) {
+                break made;
+            }
+            missing.push((outer, list));
+            outer = list.outer;
+        };
+        while let Some((media, list)) = missing.pop() {
+            made = self.find_or_make(List { outer: made, ..list });
+            renamed.insert(media, made);
         }
-        let outer = self.adopt(other, list.outer, renamed);
-        let made = self.find_or_make(List { outer, ..list });
-        renamed.insert(media, made);
         made
     }
 
-    /// Forgets all lists but that of these substances, the innermost last, in which rays start.
+    /// Forgets all lists and makes that of these substances, the innermost last, in which rays start.
     pub(crate) fn reset(&mut self, start: &[Medium]) -> Media {
         if !self.lists.is_empty() {
             self.lists.clear();
@@ -183,12 +192,20 @@ impl MediaTable {
 
     /// The list without the last substance of this material, if it is in there.
     fn leave(&mut self, media: Media, material: u32) -> Option<Media> {
-        let &List { innermost, outer, .. } = self.list(media)?;
-        if innermost.material == material {
-            return Some(outer);
+        self.within.clear();
+        let mut without = media;
+        loop {
+            let &List { innermost, outer, .. } = self.list(without)?;
+            without = outer;
+            if innermost.material == material {
+                break;
+            }
+            self.within.push(innermost);
         }
-        let without = self.leave(outer, material)?;
-        Some(self.enter(without, innermost))
+        while let Some(medium) = self.within.pop() {
+            without = self.enter(without, medium);
+        }
+        Some(without)
     }
 
     /// A surface with the same on both sides, which rays pass straight.
@@ -207,8 +224,12 @@ impl MediaTable {
         match self.leave(media, medium.material) {
             Some(beyond) => {
                 // White light that starts inside has the index of one wavelength, and is split where it leaves.
-                let is_innermost = innermost.is_some_and(|innermost| innermost.material == medium.material);
-                Crossing { n_i: if is_innermost { medium.ior } else { here }, n_t: self.ior(beyond), beyond }
+                let index = |of: Option<Medium>| match of {
+                    Some(of) if of.material == medium.material => medium.ior,
+                    Some(of) => of.ior,
+                    None => Self::EMPTY_SPACE,
+                };
+                Crossing { n_i: index(innermost), n_t: index(self.innermost(beyond)), beyond }
             }
             None => Crossing { n_i: medium.ior, n_t: here, beyond: media },
         }
@@ -261,13 +282,13 @@ mod tests {
         let mut table = MediaTable::default();
         let mut media = Media::OUTSIDE;
         let medium = |material| Medium { material, ior: 2.0 + material as f32 };
-        for material in 0..1000 {
+        for material in 0..5000 {
             let crossing = table.cross(media, medium(material), true);
             assert_eq!(crossing.n_t, medium(material).ior);
             assert!(table.list(crossing.beyond).is_some_and(|list| list.len <= MediaTable::MOST));
             media = crossing.beyond;
         }
-        assert_eq!(table.innermost(media), Some(medium(999)));
+        assert_eq!(table.innermost(media), Some(medium(4999)));
     }
 
     #[test]
@@ -348,6 +369,20 @@ mod tests {
         assert_eq!(indices(&table.cross(within, blue, false)), (1.53, 1.33));
         // The water around it is not what it leaves.
         assert_eq!(indices(&table.cross(within, WATER, false)), (1.5, 1.5));
+        // More of the same lies around that.
+        let twice = table.reset(&[GLASS, GLASS]);
+        assert_eq!(indices(&table.cross(twice, blue, false)), (1.53, 1.53));
+    }
+
+    #[test]
+    fn an_eye_within_very_many_bodies_starts_where_it_did_whatever_is_forgotten() {
+        let mut table = MediaTable::default();
+        let many: Vec<Medium> = (0..MAX_DEPTH).map(|material| Medium { material, ior: 1.5 }).collect();
+        let start = table.reset(&many);
+        let mut left = table.cross(start, many[700], false).beyond;
+        table.retain(std::iter::once(&mut left));
+        assert_eq!(table.cross(start, many[700], false).beyond, left);
+        assert_eq!(table.list(start).map(|list| list.len), Some(MAX_DEPTH));
     }
 
     #[test]

@@ -481,9 +481,9 @@ impl Bsdf {
     /// Index of refraction of the inside (1: rays pass straight on), and its dispersion; `None` where there is no inside.
     pub(crate) fn refraction(&self) -> Option<(f32, f32)> {
         let (ior, dispersion) = match &self.model {
-            Model::Phong(m) => (m.ior, m.dispersion),
+            Model::Phong(m) if m.transmission != Vec3::ZERO => (m.ior, m.dispersion),
             Model::MetalRough(m) if m.thick => (m.ior, m.dispersion),
-            Model::MetalRough(_) | Model::Unlit(_) => return None,
+            Model::Phong(_) | Model::MetalRough(_) | Model::Unlit(_) => return None,
         };
         Some(if ior > 0.0 { (ior, dispersion) } else { (1.0, 0.0) })
     }
@@ -524,7 +524,8 @@ pub(crate) fn shadow_filter(material: &Material, reader: &Reader) -> Vec3 {
     let solid = material.alpha_mode.covers(base.w);
     let passed = match &material.reflection {
         Reflection::Unlit => Vec3::ZERO,
-        Reflection::Phong(m) => m.transmission,
+        Reflection::Phong(m) if m.fresnel => m.transmission,
+        Reflection::Phong(m) => m.transmission.min(Vec3::ONE - m.mirror.min(Vec3::ONE)),
         Reflection::MetalRough(m) if m.transmission > 0.0 => {
             let share = m.transmission * reader.linear(m.transmission_map.as_ref()).x;
             base.truncate() * (share * (1.0 - metal_rough::metallic_at(m, reader)))

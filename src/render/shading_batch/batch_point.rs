@@ -55,7 +55,7 @@ impl ShadingBatch {
         Bsdf::base_layer(unmapped.model, unmapped.emission, outside)
     }
 
-    /// The ground at point `i` of this material, by number too, the back of which is seen from inside if it `has_inside`.
+    /// Point `i` of this material, by number too, the back of which is seen from inside if it `has_inside`.
     pub(crate) fn point<'a>(&'a self, i: usize, material: (u32, &'a Material), has_inside: bool) -> BatchPoint<'a> {
         BatchPoint { batch: self, i, material, outside: self.found.front[i] == 1 || !has_inside }
     }

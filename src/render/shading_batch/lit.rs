@@ -52,9 +52,9 @@ impl Default for Lit {
 }
 
 impl ShadingBatch {
-    /// Finds what `light` does at each point of a surface of `bsdf`, on which highlights may be narrow if it is
-    /// `needs_cones`; backs of what `has_inside`, which is needs_cones, are seen from inside. Of an area light it is the
-    /// `place`th of those that each point has drawn.
+    /// Finds what `light` does at each point of a surface of `bsdf`, on which highlights may be narrow if it `needs_cones`;
+    /// backs of what `has_inside`, which needs them, too, are seen from inside. Of an area light it is the `place`th of those
+    /// that each point has drawn.
     pub(crate) fn shade_light(
         &mut self,
         (bsdf, needs_cones, has_inside): (&Bsdf, bool, bool),
@@ -66,12 +66,12 @@ impl ShadingBatch {
         let overlays = self.overlays.as_deref().filter(|over| over.any());
         let cones = needs_cones.then_some(&self.cones);
         let drawn = place.map(|place| (&mut self.drawn, place));
-        let shade_light =
+        let direct =
             DirectLight { found, lit, points, bsdf, painted, point_bsdfs, overlays, cones, has_inside, light, drawn };
         if place.is_some() {
-            self.level.run(FromArea(shade_light))
+            self.level.run(FromArea(direct))
         } else {
-            self.level.run(FromPoint(shade_light))
+            self.level.run(FromPoint(direct))
         }
         if let Some(weights) = &self.weights {
             self.level.run(Weigh { weights, radiance: &mut self.lit.radiance, points });

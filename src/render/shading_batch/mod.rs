@@ -6,7 +6,7 @@
 //! So a point shaded here gives the same bits as one shaded by itself, on every instruction set. Of lights with an extent
 //! each point draws places of its own (`area_lights`). Sheen and clear coat lie over what the columns know (`overlays`).
 //! Rays that go on from glass and clear coat, what other lobes of a material show, and what is seen of panoramas and by
-//! rays to the surroundings, are found point by point, from the numbers in the columns (`lobes`, `ground`).
+//! rays to the surroundings, are found point by point, from the numbers in the columns (`lobes`, `batch_point`).
 //!
 //! What a column cannot do is left to the tracer: hits near the edge of a face, those whose distance needs more than
 //! `f64`, points whose mesh gives no tangent, and glass from which no ray goes on.

@@ -73,13 +73,13 @@ impl ShadingBatch {
     ) {
         let metal_rough = context.scene.materials[placed.mesh.material as usize].metal_rough();
         let (Some(m), Some(lobes)) = (metal_rough, constants.lobes.filter(|lobes| lobes.are_overlays)) else { return };
-        let Model::MetalRough(even) = &constants.bsdf.model else { return };
-        let even = even.inputs().occlusion;
+        let Model::MetalRough(unmapped) = &constants.bsdf.model else { return };
+        let occlusion_of_all = unmapped.inputs().occlusion;
         let mut over = self.overlays.take().unwrap_or_default();
         (over.has_sheen, over.has_coat) = (m.sheen.is_some(), m.coat.is_some());
         self.each_lobe_frame(context, traced, placed, (constants, lobes), |i, on, reader| {
             let Some(on) = on else { return over.put(i, &(None, None)) };
-            let occlusion = if self.painted.any { self.painted.occlusion[i] } else { even };
+            let occlusion = if self.painted.any { self.painted.occlusion[i] } else { occlusion_of_all };
             let (sheen, mut coat) = overlays(m, on, occlusion, reader);
             if let Some(coat) = &mut coat {
                 self.widen_coat(i, context, m, coat, on.patch);

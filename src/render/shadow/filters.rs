@@ -38,7 +38,7 @@ pub(in crate::render) fn weaken(
     crossed: &mut Hit,
     FilterHit { hit, left }: &FilterHit,
     light: &mut Vec3,
-    inside: Option<(&mut RayMedia, &mut MediaTable)>,
+    ray_media: Option<(&mut RayMedia, &mut MediaTable)>,
 ) {
     if unbent.is_some_and(|left| hit.t <= left.t && is_same_surface(|prim| context.face(prim), ray, left, hit)) {
         return;
@@ -50,7 +50,7 @@ pub(in crate::render) fn weaken(
             let target = HitPrim::new(context.scene, context.world, hit.prim);
             let filter = match unbent.is_some() && context.turns(target.material) {
                 true => Vec3::ZERO,
-                false => filter_at(context, &target, ray, hit, inside.filter(|_| !is_repeated)),
+                false => filter_at(context, &target, ray, hit, ray_media.filter(|_| !is_repeated)),
             };
             let may_have_holes = !target.material.reflection.transmits() && hit.prim < context.world.triangles();
             (filter, may_have_holes && filter == Vec3::ONE)
@@ -222,7 +222,7 @@ pub(in crate::render) fn filter_at(
     target: &HitPrim,
     ray: &Ray,
     hit: &Hit,
-    inside: Option<(&mut RayMedia, &mut MediaTable)>,
+    ray_media: Option<(&mut RayMedia, &mut MediaTable)>,
 ) -> Vec3 {
     if target.material.is_opaque() && !context.no_prune {
         return Vec3::ZERO;
@@ -233,10 +233,10 @@ pub(in crate::render) fn filter_at(
     let patch = target.patch(context.world, hit.u, hit.v, ray.origin + ray.dir * hit.t);
     let reader = Reader { store: context.textures, patch: patch.as_ref(), known: &[] };
     let filter = shadow_filter(target.material, &reader);
-    let Some((inside, table)) = inside.filter(|_| has_inside(target.material)) else { return filter };
+    let Some((ray_media, table)) = ray_media.filter(|_| has_inside(target.material)) else { return filter };
     let entering = Surface::new(context.world, *target, ray, hit, 0.0).front;
     let front = (target.material_id, entering);
-    filter * inside.cross((table, &context.absorption), front, ray, hit)
+    filter * ray_media.cross((table, &context.absorption), front, ray, hit)
 }
 
 impl RayMedia {
@@ -278,10 +278,10 @@ mod tests {
     fn left(crossings: &[(f32, u32, bool)]) -> Vec3 {
         let dir = Vec3::new(0.0, 0.0, 2.0);
         let ray = Ray { origin: Vec3::ZERO, t_min: 0.0, dir, t_max: 9.0, exclude: NO_PRIM, sample: 0 };
-        let (mut table, mut inside) = (MediaTable::default(), RayMedia::of(Media::OUTSIDE));
+        let (mut table, mut ray_media) = (MediaTable::default(), RayMedia::of(Media::OUTSIDE));
         let absorption = Absorption::from(vec![THIN, DENSE]);
         let cross = |&(t, which, entering): &(f32, u32, bool)| {
-            inside.cross((&mut table, &absorption), (which, entering), &ray, &Hit { t, ..Hit::MISS })
+            ray_media.cross((&mut table, &absorption), (which, entering), &ray, &Hit { t, ..Hit::MISS })
         };
         crossings.iter().map(cross).product()
     }

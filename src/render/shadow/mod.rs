@@ -22,7 +22,7 @@ pub(crate) struct ShadowQueue {
     rays: Tail<Ray>,
     light: Tail<Bound>,
     /// What each is inside of; empty where nothing absorbs light.
-    inside: Vec<RayMedia>,
+    ray_media: Vec<RayMedia>,
     /// Of rays that end at what would bend or spread them the hit that each has left, with `t` as far as it may meet the same
     /// surface again.
     unbent: Vec<Hit>,
@@ -82,7 +82,7 @@ impl ShadowQueue {
     pub(crate) fn push_bound(&mut self, ray: Ray, light: Bound, media: Option<Media>) {
         self.rays.push(ray);
         self.light.push(light);
-        self.inside.extend(media.map(RayMedia::of));
+        self.ray_media.extend(media.map(RayMedia::of));
     }
 
     /// Room for `N` more rays, and for the light of each; [`Self::take`] takes those that came.
@@ -95,13 +95,13 @@ impl ShadowQueue {
     pub(crate) fn take(&mut self, count: usize, media: impl Iterator<Item = Media>) {
         self.rays.grow(count);
         self.light.grow(count);
-        self.inside.extend(media.map(RayMedia::of));
+        self.ray_media.extend(media.map(RayMedia::of));
     }
 
     pub(crate) fn clear(&mut self) {
         self.rays.clear();
         self.light.clear();
-        self.inside.clear();
+        self.ray_media.clear();
         self.unbent.clear();
         self.risers.clear();
         self.raised.clear();
@@ -160,7 +160,7 @@ impl ShadowQueue {
                     &mut crossed,
                     passed,
                     light,
-                    self.inside.get_mut(i).map(|inside| (inside, &mut *media)),
+                    self.ray_media.get_mut(i).map(|ray_media| (ray_media, &mut *media)),
                 );
                 self.occluded[i] = is_dark(*light);
                 if self.occluded[i] {
@@ -242,8 +242,8 @@ impl ShadowQueue {
                 continue;
             }
             let (ray, light, mut crossed) = (self.on_way[k], &mut self.light[i].radiance, self.crossed[k]);
-            let inside = self.inside.get_mut(i).map(|inside| (inside, &mut *media));
-            weaken(context, (&ray, self.unbent.get(i)), &mut crossed, &hit.into(), light, inside);
+            let ray_media = self.ray_media.get_mut(i).map(|ray_media| (ray_media, &mut *media));
+            weaken(context, (&ray, self.unbent.get(i)), &mut crossed, &hit.into(), light, ray_media);
             self.occluded[i] = is_dark(*light);
             if self.occluded[i] {
                 continue;

@@ -346,11 +346,14 @@ pub(crate) fn faces(normal: Vec3, view: Vec3) -> bool {
 
 /// `normal`, turned just far enough that `view` sees its front.
 ///
-/// Interpolated and mapped normals may point away at silhouettes; unturned they would make black rims. That of the face itself,
-/// `geometric`, does not, however flat it is seen.
+/// Interpolated and mapped normals may point away at silhouettes; unturned they would make black rims. The normal of the face
+/// itself, `geometric`, never does, however flat it is seen, and stays.
 #[inline(always)]
 pub(crate) fn facing(normal: Vec3, geometric: Vec3, view: Vec3) -> Vec3 {
-    if faces(normal, view) || (normal == geometric && normal.dot(view) > 0.0) {
+    /// Of a normal that the file gives, and that was turned with its face.
+    const ROUNDING: f32 = 1e-6;
+    let is_own = || (normal - geometric).abs().max_element() <= ROUNDING;
+    if faces(normal, view) || (normal.dot(view) > 0.0 && is_own()) {
         return normal;
     }
     (normal + view * (GRAZING - normal.dot(view))).try_normalize().unwrap_or(view)

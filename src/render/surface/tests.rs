@@ -215,6 +215,8 @@ fn a_normal_that_points_away_is_turned_until_it_is_seen() {
     // A face's own normal is right however flat it is seen, as long as it is seen.
     let flat = Vec3::new(1.0, 0.0, 1e-3).normalize();
     assert_eq!(facing(flat, flat, Vec3::Z), flat);
+    let as_given = flat + Vec3::splat(2e-7);
+    assert_eq!(facing(as_given, flat, Vec3::Z), as_given);
     assert!(facing(flat, Vec3::X, Vec3::Z) != flat && facing(-flat, -flat, Vec3::Z).z > 0.0);
 }
 

@@ -104,9 +104,9 @@ fn plain() -> Stage {
     );
     let polished = Phong { mirror: Vec3::new(0.3, 0.2, 0.1), fresnel: true, ..phong() };
     s.mesh(round(0.4), turned(0.2, DVec3::new(-2.0, -1.0, 0.5)), material(Vec3::new(0.3, 0.3, 0.5), polished));
-    let needs_cones = Phong { specular: Vec3::splat(0.4), shininess: 9.0, ambient: Vec3::splat(0.2), ..phong() };
+    let shiny = Phong { specular: Vec3::splat(0.4), shininess: 9.0, ambient: Vec3::splat(0.2), ..phong() };
     let mirrored = turned(-0.5, DVec3::new(1.0, 0.2, 0.3)) * DAffine3::from_scale(DVec3::new(-1.0, 1.5, 1.0));
-    s.mesh(round(0.6), mirrored, material(Vec3::new(0.2, 0.5, 0.7), needs_cones));
+    s.mesh(round(0.6), mirrored, material(Vec3::new(0.2, 0.5, 0.7), shiny));
     s.mesh(square(0.0, 0.4), turned(0.7, DVec3::new(0.0, -0.8, 1.0)), material(Vec3::X, phong()));
     s.mesh(square(0.0, 0.3), turned(0.1, DVec3::new(0.2, 1.4, 0.0)), unlit(Vec3::new(0.1, 0.9, 0.3)));
     s.mesh(square(0.5, 0.3), DAffine3::from_rotation_y(3.0), Material { double_sided: false, ..Material::plain() });

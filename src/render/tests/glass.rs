@@ -2,6 +2,9 @@
 
 use super::*;
 use crate::math::Vec4;
+use crate::render::context::Context;
+use crate::render::media::Medium;
+use crate::render::media::around_eye::media_around;
 use crate::render::optics;
 use crate::scene::{AlphaMode, Environment, MetalRough};
 
@@ -500,7 +503,7 @@ fn slabs_that_touch_bend_light_as_if_a_hair_were_between_them() {
 
 #[test]
 fn an_eye_within_bodies_of_one_material_leaves_each_of_them() {
-    // A cube in another one: the eye leaves the inner wall within glass, and the outer one into the open.
+    // A ball in another one: the eye leaves the inner wall within glass, and the outer one into the open.
     let both = Phong { transmission: Vec3::ONE, mirror: Vec3::ONE, ior: 1.5, fresnel: true, ..phong() };
     let mut s = looking_down(0.0);
     s.view = View::look_at(DVec3::new(0.1, 0.2, 0.0), DVec3::new(0.1, 0.2, -1.0), DVec3::Y, Lens::orthographic(1e-3));
@@ -514,6 +517,34 @@ fn an_eye_within_bodies_of_one_material_leaves_each_of_them() {
     // Straight through the inner wall, and a little is mirrored at the outer one.
     assert_eq!((counts.primary.queries, counts.reflected.queries, counts.refracted.queries), (1, 0, 2));
     assert!((s.color().x - 0.96).abs() < 2e-3, "{}", s.color().x);
+}
+
+/// A cube of two triangles a side, wound outwards.
+fn cube(half: f32) -> Mesh {
+    let corner = |i: u32| Vec3::from([0, 1, 2].map(|axis| if i >> axis & 1 == 1 { half } else { -half }));
+    let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    Mesh {
+        positions: (0..8).map(corner).collect(),
+        triangles: sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        ..Mesh::default()
+    }
+}
+
+#[test]
+fn walls_that_are_met_on_their_edges_and_corners_are_left_once() {
+    // Looked at from the middle along diagonals of a side and of the cubes.
+    let mut s = looking_down(0.0);
+    s.view = View::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, Lens::orthographic(1.0));
+    let around = |s: &Stage| {
+        s.with_job(AccelKind::DEFAULT, |job| {
+            let context = Context::new(job.scene, job.world, job.textures, job.settings);
+            media_around(&context, job.accel, job.view)
+        })
+    };
+    for count in 1..4 {
+        s.mesh(cube(1.0 + count as f32), DAffine3::IDENTITY, glass(1.5)).scene.meshes[count - 1].material = 0;
+        assert_eq!(around(&s), vec![Medium { material: 0, ior: 1.5 }; count]);
+    }
 }
 
 #[test]

@@ -45,7 +45,7 @@ fn every_structure_tells_as_many_steps_and_tests_as_it_counts_and_the_same_tree(
 }
 
 #[test]
-fn stories_of_all_pixels_add_up_to_the_counts_of_the_picture() {
+fn ray_trees_of_all_pixels_add_up_to_the_counts_of_the_picture() {
     let mut s = busy();
     s.settings = Settings { width: 14, height: 10, samples: 2, ..s.settings };
     let counted = s.with_job(AccelKind::GridOctree, |job| render_counted(job, &())).counts;

@@ -77,7 +77,7 @@ fn a_coarse_ball_is_lit_up_to_the_line_that_its_normals_tell() {
 }
 
 #[test]
-fn a_story_has_the_rays_that_start_above_a_coarse_ball_in_its_tree_and_knows_their_light() {
+fn a_ray_tree_has_the_rays_that_start_above_a_coarse_ball_and_knows_their_light() {
     let mut s = lit_ball(ball(12, 6), DVec3::new(1.0, 0.2, 0.1));
     (s.settings.width, s.settings.height) = (24, 24);
     let mut risers = 0;

@@ -117,7 +117,7 @@ impl<'a> TextureStore<'a> {
         read
     }
 
-    /// A number of a texture at the first `count` of some places, by axis.
+    /// [`Self::channel`] at the first `count` of some places, by axis.
     #[inline(always)]
     pub(in crate::render) fn channels<const CHANNEL: usize, const N: usize>(
         &self,

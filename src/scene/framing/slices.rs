@@ -7,19 +7,19 @@ use crate::math::{DVec3, Vec3};
 use crate::scene::{Instance, Mesh, Scene};
 use rayon::prelude::*;
 
-/// Strays together own at most this share of the area …
+/// Strays together own at most this share of the area.
 const STRAY_AREA: f64 = 0.01;
-/// … and at most this share of the faces …
+/// Strays together are at most this share of the faces.
 const STRAY_COUNT: f64 = 0.1;
-/// … and lie beyond an empty gap of at least this share of the model's size.
+/// Strays lie beyond an empty gap of at least this share of the model's size.
 const GAP: f64 = 0.5;
 
 /// Slices a box is cut into along each axis to look for gaps.
 const SLICES: usize = 256;
 
-/// Triangles of a mesh are noted in so many rounds, one from all over it after the other: the first mostly leaves no gap …
+/// Triangles of a mesh are noted in so many rounds, one from all over it after the other: the first mostly leaves no gap.
 const ROUNDS: usize = 8;
-/// … unless there are so few that asking would take longer.
+/// So few are noted at once: asking would take longer.
 const FEW: usize = 1 << 10;
 
 /// How much of the model lies in each slice along each axis.

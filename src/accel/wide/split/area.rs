@@ -115,7 +115,7 @@ impl<const N: usize> Bins<N> {
         }
     }
 
-    /// What an empty part costs is no number, and never less.
+    /// The cut of least cost; `None` if each leaves a part empty. What an empty part costs is no number, and never less.
     fn cheapest(&self, leaf: u32) -> Option<SplitPlane> {
         let mut after = [Vec4::ZERO; N];
         let mut part = Sides::EMPTY;
@@ -137,6 +137,12 @@ impl<const N: usize> Bins<N> {
         // The first of equals.
         let axis = axes.reduce(|a, b| if least[b] < least[a] { b } else { a })?;
         Some(SplitPlane { axis, bin: usize::from(at[axis]), cost: least[axis] })
+    }
+
+    /// Area of the box around all, which is cut there.
+    fn area(&self, axis: usize, bin: usize) -> f32 {
+        let [first, second] = self.parts(axis, bin);
+        first.join(second).area()
     }
 
     fn parts(&self, axis: usize, bin: usize) -> [Bounds; 2] {
@@ -195,8 +201,8 @@ fn cut_in<const N: usize>(items: &mut [Item], leaf: u32, middles: Option<Bounds>
     }
     let (axis, bin) = match bins.cheapest(leaf) {
         None => return halves(items),
-        // Boxes without any area, of prims on a line or so small that it underflows: all cuts cost as little.
-        Some(SplitPlane { cost: 0.0, .. }) => (ruler.longest_axis(), N / 2),
+        // The box of all has no area, of prims on a line or so small that it underflows: all cuts cost as little.
+        Some(SplitPlane { axis, bin, cost: 0.0 }) if bins.area(axis, bin) == 0.0 => (ruler.longest_axis(), N / 2),
         Some(SplitPlane { axis, bin, .. }) => (axis, bin),
     };
     #[expect(clippy::cast_precision_loss, reason = "a few bins")]
@@ -323,6 +329,20 @@ mod tests {
                 let most = first.iter().map(y).fold(f32::MIN, f32::max);
                 assert!(second.iter().all(|item| y(item) > most - shape.y / 1000.0), "{count}");
             }
+        }
+    }
+
+    #[test]
+    fn two_lines_are_cut_apart_wherever_they_end() {
+        let mut random = Random::new(5);
+        for count in [10, 300] {
+            let mut item = |prim: u32| {
+                let at = Vec3::new(random.unit() * 9.0, (prim % 2) as f32, 0.0);
+                Item::new(Aabb { lo: at, hi: at }, prim)
+            };
+            let mut items: Vec<Item> = (0..count).map(&mut item).collect();
+            let cut = cut_by_area(&mut items, 8, None);
+            assert!(cut.at as u32 == count / 2 && items[..cut.at].iter().all(|item| item.bounds().lo.y == 0.0));
         }
     }
 

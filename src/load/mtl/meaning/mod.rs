@@ -286,14 +286,18 @@ impl Meaning<'_> {
         let mirror = if mirrors { mirror } else { Vec3::ZERO };
         // What is mirrored does not pass. Fresnel finds what is by the angle, and a map by the place.
         let is_even = !fresnel && !(self.has_map)(Slot::Specular);
-        let transmission = if is_even { transmission * (Vec3::ONE - mirror) } else { transmission };
+        let kept = if is_even { Vec3::ONE - mirror.min(Vec3::ONE) } else { Vec3::ONE };
+        let transmission = transmission * kept;
+        if glass && transmission == Vec3::ZERO && self.guessing() {
+            self.warn("mtl-opaque-glass", "illum asks for glass, but Ks mirrors all light, so that nothing passes");
+        }
         Phong {
             ambient: self.ambient(kd),
             specular,
             shininess,
             mirror,
             transmission,
-            ior: self.ior(glass),
+            ior: self.ior(transmission != Vec3::ZERO),
             fresnel,
             ..Phong::default()
         }

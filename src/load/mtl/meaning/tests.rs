@@ -101,6 +101,11 @@ fn glass_lets_through_what_it_does_not_mirror() {
         assert_eq!(phong(&guess(&text).0).transmission, passed, "{text}");
         assert_eq!(phong(&literal(&text)).transmission, passed, "{text}");
     }
+    let too_much = "Kd 0 0 0\nNs 9\nNi 1.5\nillum 6\nTf 1 1 1\nKs";
+    assert_eq!(phong(&guess(&format!("{too_much} 2 0.5 1")).0).transmission, Vec3::new(0.0, 0.5, 0.0));
+    let (m, warnings) = guess(&format!("{too_much} 1 1 1"));
+    assert_eq!((phong(&m).transmission, phong(&m).ior), (Vec3::ZERO, 1.5));
+    assert_eq!(warnings, ["mtl-opaque-glass"]);
 }
 
 #[test]
