@@ -4,13 +4,16 @@ use super::area_lights::Drawn;
 use super::columns::{Column, Columns, Found, LANES, POINTS, ShadingBatch, get, leave, padded, put};
 use super::cones::Cones;
 use super::environment::Weigh;
+use super::formulas::{
+    Diffuse, Formula, Mapped, MetalRough, Phong, PointBsdf, SidedMetalRough, Uniform, WidenedMetalRough,
+};
 use super::overlays::Overlays;
 use super::painted::Painted;
 use crate::accel::Ray;
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Simd};
 use crate::render::media::Media;
-use crate::render::shade::{Bsdf, Incident, LocalLight, Model, PhongBsdf, shadow_segment, terminator};
+use crate::render::shade::{Bsdf, Incident, LocalLight, MetalRoughBsdf, Model, PhongBsdf, shadow_segment, terminator};
 use crate::render::shade_hits::TracedRays;
 use crate::render::shadow::curve::STEEP;
 use crate::render::shadow::{Bound, ShadowQueue};
@@ -252,63 +255,18 @@ impl DirectLight<'_> {
             _ => light.arriving_at(points, (position, |_| None), |i, it| arrive(lit, i, it, in_lux)),
         }
         // The model is chosen outside the loop, which then is a formula.
-        match &bsdf.model {
+        match bsdf.model {
             _ if !point_bsdfs.is_empty() => reflect_with_lobes(found, lit, point_bsdfs),
             Model::Unlit(_) => lit.seen.fill(0),
-            Model::Phong(m) if painted.any => {
-                let m = *m;
-                let highlights = highlights(found, lit, points, |i| painted.phong(i, &m));
-                reflect(found, lit, points, |i, normal, _, to_light| {
-                    painted.phong(i, &m).lit_with(normal, to_light, highlights[i])
-                });
-            }
-            Model::Phong(m) if m.glows() => {
-                let m = *m;
-                let highlights = highlights(found, lit, points, |_| m);
-                reflect(found, lit, points, |i, normal, _, to_light| m.lit_with(normal, to_light, highlights[i]));
-            }
-            Model::Phong(m) => {
-                let m = *m;
-                reflect(found, lit, points, |_, normal, _, to_light| m.lit_with(normal, to_light, 0.0));
-            }
+            Model::Phong(m) if painted.any => reflect_phong(found, lit, points, &Mapped { painted, unmapped: m }),
+            Model::Phong(m) if m.glows() => reflect_phong(found, lit, points, &Uniform(m)),
+            Model::Phong(m) => reflect(found, lit, points, &Diffuse(m)),
             Model::MetalRough(m) => {
-                let m = *m;
-                match (painted.any, cones) {
-                    // What has overlays always has cones.
-                    (any, Some(cones)) if overlays.is_some() => {
-                        let least_square = &cones.least_square;
-                        if any {
-                            reflect_below(found, lit, points, |i, normal, view, to_light| {
-                                painted.metal_rough(i, &m).at_least(least_square[i]).lit(normal, view, to_light)
-                            });
-                        } else {
-                            reflect_below(found, lit, points, |i, normal, view, to_light| {
-                                m.at_least(least_square[i]).lit(normal, view, to_light)
-                            });
-                        }
-                        overlays.into_iter().for_each(|overlays| overlays.reflect(found, lit, points));
-                        keep_all(found, lit, points);
-                    }
-                    (true, Some(cones)) if has_inside => reflect(found, lit, points, |i, normal, view, to_light| {
-                        let m = painted.metal_rough(i, &m).at_least(cones.least_square[i]);
-                        m.lit_on_side(normal, view, to_light, found.front[i] == 1)
-                    }),
-                    (false, Some(cones)) if has_inside => reflect(found, lit, points, |i, normal, view, to_light| {
-                        let m = m.at_least(cones.least_square[i]);
-                        m.lit_on_side(normal, view, to_light, found.front[i] == 1)
-                    }),
-                    (true, Some(cones)) => reflect(found, lit, points, |i, normal, view, to_light| {
-                        painted.metal_rough(i, &m).at_least(cones.least_square[i]).lit(normal, view, to_light)
-                    }),
-                    (true, None) => reflect(found, lit, points, |i, normal, view, to_light| {
-                        painted.metal_rough(i, &m).lit(normal, view, to_light)
-                    }),
-                    (false, Some(cones)) => reflect(found, lit, points, |i, normal, view, to_light| {
-                        m.at_least(cones.least_square[i]).lit(normal, view, to_light)
-                    }),
-                    (false, None) => {
-                        reflect(found, lit, points, |_, normal, view, to_light| m.lit(normal, view, to_light));
-                    }
+                let surroundings = (overlays, cones, has_inside);
+                if painted.any {
+                    reflect_metal_rough(found, lit, points, Mapped { painted, unmapped: m }, surroundings);
+                } else {
+                    reflect_metal_rough(found, lit, points, Uniform(m), surroundings);
                 }
             }
         }
@@ -331,9 +289,38 @@ fn arrive(lit: &mut Lit, i: usize, (incident, arrives): (Incident, bool), in_lux
     lit.seen[i] = u32::from(arrives);
 }
 
+/// What points of Phong's model reflect of the light that arrives.
+#[inline(always)]
+fn reflect_phong(found: &Found, lit: &mut Lit, points: usize, bsdfs: &impl PointBsdf<Bsdf = PhongBsdf>) {
+    let highlights = &highlights(found, lit, points, bsdfs);
+    reflect(found, lit, points, &Phong { bsdfs, highlights });
+}
+
+/// What points of metallic-roughness reflect of the light that arrives. What has overlays, or an inside, always has cones.
+#[inline(always)]
+fn reflect_metal_rough(
+    found: &Found,
+    lit: &mut Lit,
+    points: usize,
+    bsdfs: impl PointBsdf<Bsdf = MetalRoughBsdf>,
+    (overlays, cones, has_inside): (Option<&Overlays>, Option<&Cones>, bool),
+) {
+    let Some(Cones { least_square, .. }) = cones else { return reflect(found, lit, points, &MetalRough(bsdfs)) };
+    let widened = WidenedMetalRough { bsdfs, least_square };
+    match overlays {
+        Some(overlays) => {
+            reflect_below(found, lit, points, &widened);
+            overlays.reflect(found, lit, points);
+            keep_all(found, lit, points);
+        }
+        None if has_inside => reflect(found, lit, points, &SidedMetalRough { widened, front: &found.front }),
+        None => reflect(found, lit, points, &widened),
+    }
+}
+
 /// How bright Phong's highlight is at each point. Powers are found one by one, and only where there is something to see.
 #[inline(always)]
-fn highlights(found: &Found, lit: &Lit, points: usize, bsdf: impl Fn(usize) -> PhongBsdf) -> Column {
+fn highlights(found: &Found, lit: &Lit, points: usize, bsdfs: &impl PointBsdf<Bsdf = PhongBsdf>) -> Column {
     let mut highlights = [0.0; POINTS];
     for (i, highlight) in highlights.iter_mut().enumerate().take(points) {
         let (normal, to_light) = (get(&found.normal, i), get(&lit.to_light, i));
@@ -341,7 +328,7 @@ fn highlights(found: &Found, lit: &Lit, points: usize, bsdf: impl Fn(usize) -> P
         *highlight = if normal.dot(to_light) > 0.0 { agreement } else { 0.0 };
     }
     for (i, highlight) in highlights.iter_mut().enumerate().take(points) {
-        let m = bsdf(i);
+        let m = bsdfs.at(i);
         if lit.seen[i] != 0 && m.glows() {
             *highlight = m.highlight(*highlight);
         }
@@ -361,10 +348,10 @@ fn keep(found: &Found, lit: &mut Lit, i: usize, (radiance, counts): (Vec3, bool)
 
 /// What the points under overlays reflect of the light that arrives.
 #[inline(always)]
-fn reflect_below(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(usize, Vec3, Vec3, Vec3) -> Vec3) {
+fn reflect_below(found: &Found, lit: &mut Lit, points: usize, formula: &impl Formula) {
     for i in 0..points.min(POINTS) {
         let (normal, view, to_light) = (get(&found.normal, i), get(&found.view, i), get(&lit.to_light, i));
-        let radiance = share(i, normal, view, to_light) * get(&lit.light, i);
+        let radiance = formula.reflected(i, normal, view, to_light) * get(&lit.light, i);
         put(&mut lit.radiance, i, radiance);
     }
 }
@@ -398,12 +385,13 @@ fn reflect_with_lobes(found: &Found, lit: &mut Lit, point_bsdfs: &[Bsdf]) {
 
 /// What the points reflect of the light that arrives.
 #[inline(always)]
-fn reflect(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(usize, Vec3, Vec3, Vec3) -> Vec3) {
+fn reflect(found: &Found, lit: &mut Lit, points: usize, formula: &impl Formula) {
     for i in 0..points.min(POINTS) {
         let (horizon, normal, to_light) = (get(&found.horizon, i), get(&found.normal, i), get(&lit.to_light, i));
         let above = horizon.dot(to_light) > 0.0;
         let smooth = terminator(horizon, normal, to_light);
-        let radiance = share(i, normal, get(&found.view, i), to_light) * get(&lit.light, i) * smooth;
+        let reflected = formula.reflected(i, normal, get(&found.view, i), to_light);
+        let radiance = reflected * get(&lit.light, i) * smooth;
         keep(found, lit, i, (radiance, above), above);
     }
 }

@@ -18,6 +18,7 @@ mod cones;
 mod constants;
 mod environment;
 mod faces;
+mod formulas;
 mod hits_by_instance;
 mod lit;
 mod lobes;
