@@ -42,37 +42,31 @@ impl Roulette {
         self.least > 0.0
     }
 
-    /// Whether a shadow ray is sent; then its light is what it carries. It is that of light `number` at a point of this branch.
+    /// Whether the shadow ray to light `number` is sent from a point of `path`; `radiance` becomes what it carries then.
     #[inline(always)]
-    pub(super) fn sends(
-        self,
-        streams: &[Stream],
-        (sample, branch, part): (u32, u32, f32),
-        number: u32,
-        radiance: &mut Vec3,
-    ) -> bool {
-        let (most, least) = (radiance.max_element(), self.least * part);
-        if most >= least {
-            return true;
-        }
-        let Some(&stream) = streams.get(sample as usize) else { return true };
-        let [drawn, _] = Draws::of(stream, mix(branch, number), Purpose::ShadowQueue).spread(1).point(0);
-        let chance = most / least;
-        *radiance *= 1.0 / chance;
-        drawn < chance
+    pub(super) fn sends(self, streams: &[Stream], sample: u32, path: &Path, number: u32, radiance: &mut Vec3) -> bool {
+        let least = self.least * path.part;
+        survives(radiance, least, streams.get(sample as usize), mix(path.branch, number), Purpose::ShadowQueue)
     }
 
     fn decide(self, streams: &[Stream], sample: u32, path: &mut Path) -> bool {
-        let (weight, least) = (path.weight.max_element(), self.least * path.part);
-        if weight >= least {
-            return true;
-        }
-        let Some(&stream) = streams.get(sample as usize) else { return true };
-        let [drawn, _] = Draws::of(stream, path.branch, Purpose::Roulette).spread(1).point(0);
-        let chance = weight / least;
-        path.weight *= 1.0 / chance;
-        drawn < chance
+        let least = self.least * path.part;
+        survives(&mut path.weight, least, streams.get(sample as usize), path.branch, Purpose::Roulette)
     }
+}
+
+/// Whether a `value` below `least` goes on, with the probability that makes it `least` then; without a stream it does as it is.
+#[inline(always)]
+fn survives(value: &mut Vec3, least: f32, stream: Option<&Stream>, branch: u32, purpose: Purpose) -> bool {
+    let most = value.max_element();
+    if most >= least {
+        return true;
+    }
+    let Some(&stream) = stream else { return true };
+    let [drawn, _] = Draws::of(stream, branch, purpose).spread(1).point(0);
+    let chance = most / least;
+    *value *= 1.0 / chance;
+    drawn < chance
 }
 
 #[cfg(test)]
@@ -108,7 +102,7 @@ mod tests {
         for (light, number) in [(0.1, 0), (0.06, 9), (0.01, 7 << 16), (0.2, 1)] {
             let sends = |sample| {
                 let mut radiance = Vec3::new(light, 0.5 * light, 0.0);
-                roulette.sends(&streams, (sample, 5, 1.0), number, &mut radiance).then_some(radiance)
+                roulette.sends(&streams, sample, &path(1.0, 5), number, &mut radiance).then_some(radiance)
             };
             let sent: Vec<Vec3> = (0..1024).filter_map(sends).collect();
             let carried = light.max(0.125);
@@ -117,7 +111,10 @@ mod tests {
             assert!((mean.x - light).abs() < 1e-3 * carried, "{light}: {mean}");
         }
         // What is spread over several rays is judged together, and lights by themselves.
-        let sends = |part, number, sample| roulette.sends(&streams, (sample, 5, part), number, &mut Vec3::splat(0.05));
+        let sends = |part, number, sample| {
+            let path = Path { part, ..path(1.0, 5) };
+            roulette.sends(&streams, sample, &path, number, &mut Vec3::splat(0.05))
+        };
         assert!((0..100).all(|sample| sends(0.4, 0, sample)));
         let differ = (0..1024).filter(|&sample| sends(1.0, 0, sample) != sends(1.0, 1, sample)).count();
         assert!(differ > 300, "{differ}");

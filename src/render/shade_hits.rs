@@ -431,8 +431,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             return;
         }
         batch.choose(|at, sample, radiance| {
-            let path = traced.path(at);
-            self.roulette.sends(&self.streams, (sample, path.branch, path.part), number, radiance)
+            self.roulette.sends(&self.streams, sample, &traced.path(at), number, radiance)
         });
     }
 

@@ -417,8 +417,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             return self.add(point.ray.sample, radiance);
         }
         let sample = point.ray.sample;
-        let place = (sample, point.path.branch, point.path.part);
-        if self.chooses_shadow_rays() && !self.roulette.sends(&self.streams, place, number, &mut radiance) {
+        if self.chooses_shadow_rays() && !self.roulette.sends(&self.streams, sample, &point.path, number, &mut radiance)
+        {
             return;
         }
         let inside = self.context.absorption.is_some().then_some(point.path.media);
