@@ -18,78 +18,78 @@ use std::path::Path;
 /// How pixels are sampled.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct SamplingArgs {
-    /// Which rays a pixel gets: `off` one through its middle; `uniform` --samples at the same places in each; `adaptive`
-    /// corners and middle, and more where these differ; `stochastic` more until its mean is certain [default: stochastic,
-    /// or what other flags ask for]
+    /// How the rays of a pixel are chosen: `off` one through its middle; `uniform` --samples of them at the same places in
+    /// each; `adaptive` corners and middle, and more where these differ; `stochastic` more until the mean is certain
+    /// [default: stochastic, unless other flags imply another]
     #[arg(long, value_name = "HOW", value_enum, help_heading = "Quality", hide_short_help = true)]
     pub aa: Option<Aa>,
-    /// How good a stochastic picture is to be: draft (error per pixel 0.25, up to 64 rays), normal (0.08, up to 256) or final
+    /// Quality of a stochastic picture: draft (error per pixel 0.25, up to 64 rays), normal (0.08, up to 256) or final
     /// (0.035, up to 1024) [default: normal]
     #[arg(long, value_name = "WORD", value_parser = parse::named::<Quality>(), help_heading = "Quality")]
     pub quality: Option<Quality>,
-    /// Exactly N rays a pixel, at the same places in each (--aa uniform). Costs of pixels (--layers tests, --heatmap) are
-    /// always those of N rays, 4 when nothing is said
+    /// Exactly N rays per pixel, at the same places in each (--aa uniform). Costs of pixels (--layers tests, --heatmap) are
+    /// always those of N rays, 4 by default
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_RAYS)),
           help_heading = "Quality")]
     pub samples: Option<u32>,
-    /// Error of a pixel that stochastic sampling stops at: root mean square over its channels, which run from 0 to 1 in the
-    /// written picture. Half of it costs about two to three times the rays
+    /// Error at which stochastic sampling stops in a pixel: root mean square over its channels, which run from 0 to 1 in the
+    /// written picture. Half the error costs about two to three times the rays
     #[arg(long, value_name = "E", value_parser = parse::error, help_heading = "Quality", hide_short_help = true)]
     pub pixel_error: Option<f32>,
-    /// Error of the whole picture to reach, and not much less: the root of its mean squared error, in the numbers of
-    /// --error-space. A part of the picture is rendered first to find out how (see --dry-run); then it is rendered twice, the
-    /// difference of both tells the error, and what is missing is added. It takes as many rays as that needs: not with
-    /// --max-samples
+    /// Error of the whole picture to reach, and not much less: root mean square in the numbers of --error-space. Part of the
+    /// picture is rendered first to plan (see --dry-run); then it is rendered twice, so that the difference tells the error,
+    /// and missing samples are added. It takes as many rays as needed: not with --max-samples
     #[arg(long, value_name = "E", value_parser = parse::error, help_heading = "Quality", hide_short_help = true,
           conflicts_with_all = ["pixel_error", "quality"])]
     pub target_error: Option<f32>,
-    /// How certain that error is to be, such as 95% or 0.95 [default: 95%]
+    /// Confidence with which the error is to be met, such as 95% or 0.95 [default: 95%]
     #[arg(long, value_name = "PERCENT", value_parser = parse::confidence, help_heading = "Quality", hide_short_help = true)]
     pub confidence: Option<f64>,
-    /// Fewest rays of a pixel of stochastic sampling, enough where they and those of its neighbours agree; the next power of
-    /// two is taken. Light, gloss and environment rays are divided by it, by 4 at least [default: 1; 16 with
-    /// --aperture, and for points and lines narrower than 2 pixels]
+    /// Fewest rays per pixel of stochastic sampling, which are enough where they and those of the neighbours agree; rounded
+    /// up to a power of two. Light, gloss and environment rays per sample are divided by it, at least by 4 [default: 1; 16
+    /// with --aperture, and for points and lines narrower than 2 pixels]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_RAYS)),
           help_heading = "Quality",
           hide_short_help = true)]
     pub min_samples: Option<u32>,
-    /// Most rays of a pixel of stochastic sampling, certain or not; the power of two below is taken
+    /// Most rays per pixel of stochastic sampling, certain or not; rounded down to a power of two
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1_048_576), help_heading = "Quality",
           hide_short_help = true)]
     pub max_samples: Option<u32>,
-    /// What of a pixel and around it counts in stochastic sampling: box, all of it alike; tent, its middle most, softer
-    /// [default: box]
+    /// Reconstruction filter of stochastic sampling: box (uniform over the pixel) or tent (weighted to its middle and
+    /// reaching beyond it, softer) [default: box]
     #[arg(long, value_name = "NAME", value_parser = parse::named::<Filter>(), help_heading = "Quality",
           hide_short_help = true)]
     pub filter: Option<Filter>,
-    /// In what numbers --pixel-error, --target-error and --aa-threshold count: sRGB codes after exposure and tone map, or
+    /// Space in which --pixel-error, --target-error and --aa-threshold count: sRGB codes after exposure and tone map, or
     /// linear light [default: linear for EXR, else display]
     #[arg(long, value_name = "SPACE", value_enum, help_heading = "Quality", hide_short_help = true)]
     pub error_space: Option<SpaceArg>,
-    /// Which quarters of a pixel adaptive sampling looks at closer: `corners` those whose corner differs from the middle of the
-    /// pixel, as the algorithm was published; `effect` those that, by all that was found on their border, could change the
-    /// pixel: fewer rays for a smaller error [default: effect]
+    /// Which quadrants of a pixel adaptive sampling subdivides: `corners` those whose corner differs from the middle of the
+    /// pixel, as published; `effect` those that, judging by everything found on their border, could change the pixel: fewer
+    /// rays for a smaller error [default: effect]
     #[arg(long, value_name = "NAME", value_parser = parse::named::<Split>(), help_heading = "Quality",
           hide_short_help = true)]
     pub aa_split: Option<Split>,
-    /// What they are looked at above: what they could change the pixel by, 0 to 1 in the written picture, half of it for
-    /// half again as many rays [default: 0.001]; of corners the difference of a channel, linear light after exposure
-    /// [default: 0.05]
+    /// Threshold above which they are subdivided: for `effect` the possible change of the pixel, 0 to 1 in the written
+    /// picture, half of it for 1.5 times the rays [default: 0.001]; for `corners` the difference of a channel, linear light
+    /// after exposure [default: 0.05]
     #[arg(long, value_name = "T", value_parser = parse::error, help_heading = "Quality", hide_short_help = true)]
     pub aa_threshold: Option<f32>,
-    /// How often adaptive sampling halves a pixel at most; 0: five rays [default: 6, of corners 3]
+    /// Most subdivisions of a pixel in adaptive sampling; 0: five rays [default: 6; 3 for `corners`]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(Adaptive::MAX_LEVELS)),
           help_heading = "Quality", hide_short_help = true)]
     pub aa_depth: Option<u32>,
-    /// How often it halves every pixel: what lies between the rays is missed, of which there are 2, 8, 32 … to a pixel. Each
-    /// more costs four times the rays where nothing is to be seen [default: 1, of corners 0]
+    /// Subdivisions that every pixel gets in adaptive sampling: detail that lies between all rays is missed, and there are 2,
+    /// 8, 32 … of them per pixel. Each level costs four times the rays in empty regions [default: 1; 0 for `corners`]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(Adaptive::MAX_LEVELS)),
           help_heading = "Quality", hide_short_help = true)]
     pub aa_min_depth: Option<u32>,
-    /// Radius of the lens, in the units of the model: what is not at --focus is blurred [default: 0, everything is sharp]
+    /// Radius of the lens, in the units of the model: everything away from --focus is blurred [default: 0, everything is
+    /// sharp]
     #[arg(long, value_name = "R", value_parser = parse::radius, help_heading = "Camera", hide_short_help = true)]
     pub aperture: Option<f64>,
-    /// What is sharp: a distance along the line of sight, or a point [default: the middle of the model]
+    /// Where the picture is sharp: a distance along the line of sight, or a point [default: the middle of the model]
     #[arg(long, value_name = "D|X,Y,Z", value_parser = parse::focus, requires = "aperture", help_heading = "Camera",
           hide_short_help = true, allow_hyphen_values = true)]
     pub focus: Option<Focus>,

@@ -15,7 +15,7 @@ pub(in crate::cli) struct ExplainArgs {
     /// Columns and rows of the pictures that are counted
     #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "160x120", help_heading = "Picture")]
     pub size: (u32, u32),
-    /// Bounces after the eye ray [default: what the scene needs]
+    /// Bounces after the primary ray [default: what the scene needs]
     #[arg(long, value_name = "N", value_parser = parse::depth(), help_heading = "Picture")]
     pub depth: Option<u32>,
     /// From where it is seen.

@@ -21,7 +21,7 @@ pub(in crate::cli) struct GenerateArgs {
     /// Only warnings and errors on standard error
     #[arg(short, long)]
     pub quiet: bool,
-    /// How messages are written to standard error
+    /// Format of the messages on standard error
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub messages: MessageFormat,
 }

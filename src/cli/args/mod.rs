@@ -52,17 +52,17 @@ pub(super) enum Command {
     /// Render models into pictures
     #[command(after_help = RENDER_EXAMPLES)]
     Render(Box<RenderArgs>),
-    /// Say what a file holds: sizes, faults, materials, cameras, lights, extensions
+    /// List what a file holds: sizes, faults, materials, cameras, lights, extensions
     Inspect(InspectArgs),
-    /// Judge how far a mesh's hits can be trusted: rays aimed at what is hard, against exact arithmetic
+    /// Judge how far a mesh's hits can be trusted: rays aimed at hard cases, against exact arithmetic
     Verify(VerifyArgs),
-    /// Compare structures on a model: the same rays through each, whether the hits are the same, what they cost
+    /// Compare structures on a model: the same rays through each, whether the hits are equal, what they cost
     Bench(Box<BenchArgs>),
-    /// Say why a mesh costs what it costs: what is taken away in turn, and what that saves
+    /// Find out why a mesh costs what it costs: removes likely causes in turn and counts the saving
     Explain(Box<ExplainArgs>),
-    /// Measure what each knob buys: time against error of every setting on a model, and which to use
+    /// Measure what each setting buys on a model: time against error, and which to use
     Study(Box<StudyArgs>),
-    /// Tell one ray of a picture in order: what it visits, tests and hits, and all rays that come of it
+    /// Follow one ray of a picture: what it visits, tests and hits, and all rays that it spawns
     Trace(Box<TraceArgs>),
     /// Compare two pictures: RMSE, PSNR, FLIP, the worst pixel, a heat map
     Diff(Box<DiffArgs>),

@@ -16,7 +16,7 @@ pub(in crate::cli) struct ModelArgs {
     /// How.
     #[command(flatten)]
     pub load: LoadArgs,
-    /// How messages are written to standard error
+    /// Format of the messages on standard error
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub messages: MessageFormat,
 }
@@ -27,34 +27,34 @@ pub(in crate::cli) struct LoadArgs {
     /// Axis that points up in the file [default: what the file says, or a guess]
     #[arg(long, value_name = "AXIS", value_enum, help_heading = "Loading")]
     pub up: Option<Axis>,
-    /// Which scene of a glTF file, by name or number from 0
+    /// Scene of a glTF file, by name or number from 0
     #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
     pub scene: Option<String>,
-    /// Which materials of a glTF file that offers variants, by name or number from 0 (`inspect` lists them)
+    /// Material variant of a glTF file that offers some, by name or number from 0 (`inspect` lists them)
     #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
     pub variant: Option<String>,
     /// Which moment of an animation.
     #[command(flatten)]
     pub moment: MomentArgs,
-    /// What becomes of OBJ, PLY and NFF faces with more than three corners
+    /// How to treat OBJ, PLY and NFF faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub polygons: PolygonsArg,
-    /// Give meshes without normals smooth ones, but for edges at which faces lean by more than so many degrees, 30 when
-    /// none are given
+    /// Give meshes without normals smooth ones, except at edges where faces meet at more than so many degrees, 30 unless
+    /// given
     #[arg(long, value_name = "DEGREES", value_parser = parse::lean, num_args = 0..=1, require_equals = true,
           default_missing_value = "30", help_heading = "Loading", hide_short_help = true)]
     pub smooth: Option<f64>,
-    /// How wide points and lines are, units of the model [default: 1/256 of its diagonal, less where there are very many]
+    /// Width of points and lines, in units of the model [default: 1/256 of its diagonal, less where there are very many]
     #[arg(long, value_name = "WIDTH", value_parser = parse::above_zero, help_heading = "Loading",
           hide_short_help = true)]
     pub line_width: Option<f64>,
-    /// Understand MTL files as exporters mean them, or to the letter
+    /// Read MTL files as exporters mean them, or to the letter
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub mtl: MtlArg,
-    /// Read other files only below this folder [default: the model's folder; of an archive the archive, always]
+    /// Read other files only below this folder [default: the model's folder; for an archive always the archive]
     #[arg(long, value_name = "DIR", help_heading = "Loading", hide_short_help = true)]
     pub root: Option<PathBuf>,
-    /// Refuse inputs that take more memory than this to load, such as 2G or 500M; what is built of them comes on top
+    /// Refuse inputs that take more memory than this to load, such as 2G or 500M; structures built from them come on top
     #[arg(long, value_name = "SIZE", value_parser = parse::bytes, help_heading = "Loading", hide_short_help = true)]
     pub max_memory: Option<u64>,
 }
@@ -96,11 +96,11 @@ pub(in crate::cli) struct MomentArgs {
     #[arg(long, value_name = "TIME", value_parser = parse::time, help_heading = "Animation", hide_short_help = true,
           conflicts_with = "frame")]
     pub time: Option<f64>,
-    /// The same by a number from 0: the pose at N / FPS seconds. The camera is framed on that pose, so that for a
-    /// sequence it has to be fixed, by --eye, --camera or --frames
+    /// Pose by frame number from 0, at N / FPS seconds. The camera is framed on that pose; to fix it for a sequence use
+    /// --eye, --camera or --frames
     #[arg(long, value_name = "N", help_heading = "Animation", hide_short_help = true)]
     pub frame: Option<u32>,
-    /// Frames a second [default: 24]
+    /// Frames per second [default: 24]
     #[arg(long, value_name = "FPS", value_parser = parse::above_zero, help_heading = "Animation", hide_short_help = true)]
     pub fps: Option<f64>,
 }
@@ -120,7 +120,7 @@ pub(in crate::cli) enum PolygonsArg {
     /// Cut into triangles
     #[default]
     Cut,
-    /// Planar ones of up to 256 corners stay whole
+    /// Keep planar ones of up to 256 corners whole
     Whole,
 }
 
@@ -130,7 +130,7 @@ pub(in crate::cli) enum MtlArg {
     /// Replace values that exporters write carelessly, with a warning each
     #[default]
     Guess,
-    /// What the text says
+    /// Take the text at its word
     Literal,
 }
 

@@ -7,8 +7,8 @@ use clap::Args;
 /// Parameters of the structures; what is left out follows from the kind of structure.
 #[derive(Debug, Clone, Args)]
 pub(in crate::cli) struct AccelArgs {
-    /// Cells of the grid per shape, or fewer where shapes would stand in more than about six cells each [default: 0.25
-    /// where crowded cells are refined, 4 for `grid`]
+    /// Cells of the grid per shape, or fewer where shapes would lie in more than about six cells each [default: 0.25 where
+    /// crowded cells are refined, 4 for `grid`]
     #[arg(long, value_name = "RATIO", help_heading = "Structure", hide_short_help = true)]
     pub grid_density: Option<f64>,
     /// Most cells of the grid along an axis [default: 256]
@@ -17,7 +17,7 @@ pub(in crate::cli) struct AccelArgs {
     /// Most octree levels below a cell of the grid [default: 8; 10 for `octree`]
     #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
     pub max_depth: Option<u32>,
-    /// Cost of visiting a cell, counted in tests; cells are split when that should pay [default: 4]
+    /// Cost of visiting a cell, in units of a ray/prim test; cells are split where that should pay [default: 4]
     #[arg(long, value_name = "COST", help_heading = "Structure", hide_short_help = true)]
     pub step_cost: Option<f64>,
     /// Most shapes in a leaf [default: 2 for `bvh` and `grid-bvh`; octrees go by --step-cost]
@@ -29,11 +29,11 @@ pub(in crate::cli) struct AccelArgs {
     /// Most references per shape in the cells of octrees [default: 12]
     #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
     pub max_references: Option<f64>,
-    /// What puts a shape into a cell: its surface or its box (grids and octrees)
+    /// What assigns a shape to a cell: its surface or its box (grids and octrees)
     #[arg(long, value_name = "WHAT", value_parser = parse::named::<Assign>(), default_value = Assign::Surface.name(),
           help_heading = "Structure", hide_short_help = true)]
     pub assign: Assign,
-    /// What a ray remembers of the shapes it met, so that they are tested once (grids and octrees)
+    /// Which tested shapes a ray remembers, so that each is tested once (grids and octrees)
     #[arg(long, value_name = "KIND", value_parser = parse::named::<MailboxKind>(),
           default_value = MailboxKind::Exact.name(), help_heading = "Structure", hide_short_help = true)]
     pub mailbox: MailboxKind,

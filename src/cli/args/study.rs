@@ -32,14 +32,14 @@ pub(in crate::cli) struct StudyArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=64), default_value_t = Study::DEFAULT.passes,
           help_heading = "Run")]
     pub passes: u32,
-    /// Samples a pixel of the reference
+    /// Samples per pixel of the reference
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=1 << 20),
           default_value_t = Study::DEFAULT.reference_samples, help_heading = "Run")]
     pub reference_samples: u32,
-    /// Other numbers give other renderings
+    /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Run")]
     pub seed: u64,
-    /// Structure that the rays go through; all find the same hits with the exact test
+    /// Structure that traces the rays; with the exact test all find the same hits
     #[arg(long, value_name = "NAME", value_parser = parse::named::<AccelChoice>(), default_value = AccelChoice::AUTO,
           help_heading = "Run")]
     pub accel: AccelChoice,
@@ -49,7 +49,7 @@ pub(in crate::cli) struct StudyArgs {
     /// What the kernels may use.
     #[command(flatten)]
     pub simd: SimdArgs,
-    /// Write a report too, after each setting; what kind the ending says: json, csv, html
+    /// Also write a report, after each setting; its extension says the format: json, csv, html
     #[arg(long, value_name = "PATH", action = ArgAction::Append, help_heading = "Run")]
     pub report: Vec<PathBuf>,
     /// Only the table, warnings and errors

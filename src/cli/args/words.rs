@@ -31,7 +31,7 @@ pub(in crate::cli) enum MessageFormat {
     /// For people
     #[default]
     Text,
-    /// One JSON object a line
+    /// One JSON object per line
     Json,
 }
 
@@ -40,7 +40,7 @@ pub(in crate::cli) enum MessageFormat {
 pub(in crate::cli) enum SpaceArg {
     /// sRGB codes, 0 to 1
     Display,
-    /// Light
+    /// Linear light
     Linear,
 }
 

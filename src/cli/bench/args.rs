@@ -63,27 +63,27 @@ pub(in crate::cli) struct BenchArgs {
     /// How to load them.
     #[command(flatten)]
     pub load: LoadArgs,
-    /// How messages are written to standard error
+    /// Format of the messages on standard error
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub messages: MessageFormat,
 
-    /// Measure how cost grows, on scenes of this family in the --sizes given, made in memory
+    /// Measure how cost grows, on scenes of this family made in memory in the --sizes given
     #[arg(long, value_name = "NAME", value_parser = parse::named::<Family>(), conflicts_with = "inputs", conflicts_with_all = OF_FILES,
           help_heading = "Growth")]
     pub generate: Option<Family>,
-    /// Triangles of the scenes, each made as near as its family can: a list 1e3,1e4, a range by tens 1e3..1e6 (with its
-    /// end, 1e3..5e4 is 1e3, 1e4, 5e4), or so many with equal ratios, 1e3..1e6:7
+    /// Triangles of the scenes, each made as near as its family can: a list 1e3,1e4; a range by powers of ten 1e3..1e6
+    /// (including its end: 1e3..5e4 is 1e3, 1e4, 5e4); or a number of sizes at equal ratios, 1e3..1e6:7
     #[arg(long, value_name = "SIZES", value_parser = parse::sizes, default_value = "1e3..1e5", conflicts_with = "inputs",
           help_heading = "Growth")]
     pub sizes: parse::Sizes,
 
-    /// Measure the structures that have this parameter at several values and at the default: a list grid-density=1,4, six
-    /// values of a range grid-density=0.5..16 (by equal ratios; max-depth=0..10 by equal differences), or so many,
-    /// grid-density=0.5..16:9. Parameters: grid-density, grid-resolution, max-depth, step-cost, leaf-size
+    /// Measure the structures with several values of this parameter, and with its default: a list grid-density=1,4; six
+    /// values of a range grid-density=0.5..16 (by equal ratios; max-depth=0..10 by equal differences); or another number of
+    /// them, grid-density=0.5..16:9. Parameters: grid-density, grid-resolution, max-depth, step-cost, leaf-size
     #[arg(long, value_name = "NAME=VALUES", conflicts_with_all = ["generate", "baseline"], help_heading = "Structure")]
     pub sweep: Option<Sweep>,
-    /// Count on the NFF files of this folder what was published of the Standard Procedural Databases in 1999, and put both
-    /// side by side: rays, grids, octrees. With it go --slow-tests (of a structure), --seed and --report
+    /// Count on the NFF files of this folder what was published of the Standard Procedural Databases in 1999, and print both
+    /// side by side: rays, grids, octrees. Goes with --slow-tests (of a structure), --seed and --report
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["inputs", "generate", "sweep", "baseline"],
           conflicts_with_all = OF_FILES.iter().filter(|flag| **flag != "max_memory"), conflicts_with_all = OF_RUNS,
           help_heading = "Published figures")]
@@ -100,20 +100,20 @@ pub(in crate::cli) struct BenchArgs {
     /// Columns and rows of the picture whose rays are recorded
     #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "256x192", help_heading = "Rays")]
     pub size: (u32, u32),
-    /// Rays a pixel
+    /// Rays per pixel
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), default_value_t = 1,
           help_heading = "Rays")]
     pub samples: u32,
-    /// Bounces after the eye ray [default: what the scene needs]
+    /// Bounces after the primary ray [default: what the scene needs]
     #[arg(long, value_name = "N", value_parser = parse::depth(), help_heading = "Rays")]
     pub depth: Option<u32>,
     /// From where it is seen.
     #[command(flatten)]
     pub eye: EyeArgs,
-    /// Rays of each class at most, up to 524288; of more an even sample is taken
+    /// Most rays of each class, up to 524288; from more an even sample is taken
     #[arg(long, value_name = "N", default_value_t = Plan::RAYS, value_parser = parse::rays, help_heading = "Rays")]
     pub rays: usize,
-    /// Other numbers give other diffuse rays and samples
+    /// Seed of the diffuse rays and of the samples
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Rays")]
     pub seed: u64,
 
@@ -126,24 +126,25 @@ pub(in crate::cli) struct BenchArgs {
     /// What the kernels may use.
     #[command(flatten)]
     pub simd: SimdArgs,
-    /// Ray/prim tests of each class that a slow structure may take in a pass; it gets as few rays as that allows, but 16
+    /// Most ray/prim tests of each class that a slow structure may take in a pass; it gets as few rays as that allows, but at
+    /// least 16
     #[arg(long, value_name = "N", default_value_t = Plan::SLOW_TESTS, help_heading = "Run")]
     pub slow_tests: u64,
-    /// Write a report too, after each structure; what kind the ending says: json, csv, md, html
+    /// Also write a report, after each structure; its extension says the format: json, csv, md, html
     #[arg(long, value_name = "PATH", action = ArgAction::Append, help_heading = "Run")]
     pub report: Vec<PathBuf>,
-    /// Tests that the brightest colour of an HTML report's heat maps stands for [default: the most of any pixel]
+    /// Tests of the brightest colour of an HTML report's heat maps [default: the most of any pixel]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Run")]
     pub heatmap_max: Option<u32>,
-    /// Two structures whose tests in each pixel an HTML report shows the difference of, such as grid,fast-bvh [default:
-    /// the fast ones, or the first two]
+    /// Two structures whose difference of tests in each pixel an HTML report shows, such as grid,fast-bvh [default: the fast
+    /// ones, or the first two]
     #[arg(long, value_name = "A,B", value_parser = parse::named::<AccelKind>(), value_delimiter = ',',
           conflicts_with = "sweep", help_heading = "Run")]
     pub compare: Vec<AccelKind>,
     /// An earlier JSON report of the same models and rays
     #[arg(long, value_name = "FILE", help_heading = "Run", requires = "fail_if")]
     pub baseline: Option<PathBuf>,
-    /// Exit with code 1 when a count has changed more since the baseline, such as 'n_it>+1%'
+    /// Exit with code 1 when a count has changed since the baseline by more than this, such as 'n_it>+1%'
     #[arg(long, value_name = "LIMIT", value_delimiter = ',', help_heading = "Run", requires = "baseline")]
     pub fail_if: Vec<Limit>,
     /// Only the tables, warnings and errors

@@ -16,14 +16,14 @@ pub(in crate::cli) struct TraceArgs {
     /// Column and row of the pixel, from 0 at the top left
     #[arg(long, value_name = "X,Y", value_parser = parse::pixel, allow_hyphen_values = true, help_heading = "Ray")]
     pub pixel: (u32, u32),
-    /// Samples a pixel; one goes through its centre
+    /// Samples per pixel; a single one goes through its centre
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), default_value_t = 1,
           help_heading = "Ray")]
     pub samples: u32,
-    /// Which of them, from 0
+    /// Sample to follow, from 0
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Ray")]
     pub sample: u32,
-    /// Bounces after the eye ray [default: what the scene needs]
+    /// Bounces after the primary ray [default: what the scene needs]
     #[arg(long, value_name = "N", value_parser = parse::depth(), help_heading = "Ray")]
     pub depth: Option<u32>,
     /// Weight below which a branch of the ray tree ends [default: 0.001953125]
@@ -42,12 +42,12 @@ pub(in crate::cli) struct TraceArgs {
     /// Vertical field of view, degrees
     #[arg(long, value_name = "DEGREES", value_parser = parse::fov, help_heading = "Camera")]
     pub fov: Option<f64>,
-    /// Parallel rays, seeing HEIGHT units [default: what the model needs]
+    /// Orthographic camera that sees HEIGHT units [default: what the model needs]
     #[arg(long, value_name = "HEIGHT", num_args = 0..=1, default_missing_value = "auto", value_parser = parse::ortho,
           require_equals = true, conflicts_with = "fov", help_heading = "Camera")]
     pub ortho: Option<parse::Ortho>,
 
-    /// Structure that the ray goes through; all find the same hits
+    /// Structure that traces the ray; all find the same hits
     #[arg(long, value_name = "NAME", value_parser = parse::named::<AccelChoice>(), default_value = AccelChoice::AUTO,
           help_heading = "Structure")]
     pub accel: AccelChoice,

@@ -12,10 +12,10 @@ pub(in crate::cli) struct VerifyArgs {
     /// What to judge.
     #[command(flatten)]
     pub model: ModelArgs,
-    /// Rays of each kind for each place and size of the mesh
+    /// Rays of each kind for each position and scale of the mesh
     #[arg(long, value_name = "N", default_value_t = Plan::DEFAULT.rays, value_parser = parse::positive)]
     pub rays: usize,
-    /// Other numbers give other rays
+    /// Seed of the rays
     #[arg(long, value_name = "N", default_value_t = Plan::DEFAULT.seed)]
     pub seed: u64,
     /// What the kernels may use.
@@ -24,7 +24,7 @@ pub(in crate::cli) struct VerifyArgs {
     /// Print JSON (schema `meshray-verify/1`)
     #[arg(long)]
     pub json: bool,
-    /// Write a page for a browser that plots the tests' speed against their wrong answers
+    /// Write an HTML page that plots the tests' speed against their wrong answers
     #[arg(long, value_name = "FILE.html")]
     pub plot: Option<PathBuf>,
     /// Only warnings and errors on standard error
