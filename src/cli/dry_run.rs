@@ -79,7 +79,7 @@ impl Told<'_> {
         ));
         lines.extend(self.memory.map(|held| ("memory", bytes(held))));
         let mut text = format!(
-            "{}, {}{}: {}×{}, foretold from {:.1} % of the pixels, with 95 % confidence; nothing is written\n",
+            "{}, {}{}: {}×{}, forecast from {:.1} % of the pixels, with 95 % confidence; nothing is written\n",
             self.which.file.display(),
             self.which.view,
             self.which.target.path().map_or(String::new(), |path| format!(", as {}", path.display())),

@@ -326,7 +326,7 @@ pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
     if let Some(to) = sampled.targeted {
         let at_most = if to.estimate.is_none() { "at most " } else { "" };
         return format!(
-            "{:.1} samples a pixel (at most {}) and {:.1} to find out how many, of what they met error {at_most}{:.4} where {} was asked for (foretold {:.4} and {:.1} s of processor time, took {:.1} s)",
+            "{:.1} samples a pixel (at most {}) and {:.1} to find out how many: picture error {at_most}{:.4} of what rays have met, where {} was asked for (forecast {:.4} and {:.1} s of processor time, took {:.1} s)",
             sampled.samples(),
             sampled.most(),
             sampled.mean() - sampled.samples(),
@@ -346,7 +346,7 @@ pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
             let percent = |n: u64| 100.0 * n as f64 / sampled.pixels.max(1) as f64;
             let rmse = sampled.rmse().unwrap_or(0.0);
             format!(
-                "{:.1} samples a pixel (at most {}), of what they met {:.1} % of pixels within {} at {} %, error about {rmse:.4} at most, {:.0} % of the rays to spare",
+                "{:.1} samples a pixel (at most {}): {:.1} % of pixels within {} at {} % confidence, picture error at most about {rmse:.4} (of what rays have met), {:.0} % of the rays to spare",
                 sampled.samples(),
                 sampled.most(),
                 percent(sampled.met),

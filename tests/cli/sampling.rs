@@ -68,7 +68,7 @@ fn the_default_stops_when_it_is_certain_and_says_so() {
     let squares: f64 = channel("sampling.error").values.iter().map(|e| e * e).sum();
     assert!(((squares / (32.0 * 24.0)).sqrt() - number("rmse")).abs() < 1e-9);
     assert!(number("spare") > 0.0 && number("spare") < 0.8 * rays, "{sampling}");
-    let words = ["samples a pixel", "within 0.08", "at 95 %", "error about", "at most, ", "to spare"];
+    let words = ["samples a pixel", "within 0.08", "at 95 % confidence", "error at most about", "have met", "to spare"];
     run(&folder, &["-o", "a.png"]).ends(0).says(&words);
 }
 
@@ -158,7 +158,7 @@ fn what_finding_out_takes_is_foretold_with_the_rest() {
 fn an_error_that_is_asked_for_is_reached_and_said_with_what_was_foretold() {
     let folder = Folder::with_cube();
     let run = folder.run(&["render", "cube.obj", "--size", "96x72", "--target-error", "0.002", "-o", "a.png"]).ends(0);
-    run.says(&["where 0.002 was asked for", "foretold"]);
+    run.says(&["where 0.002 was asked for", "forecast"]);
     folder.run(&["render", "cube.obj", "--target-error", "0.002", "--samples", "4"]).ends(2).says(&["--target-error"]);
     folder.run(&["render", "cube.obj", "--target-error", "0.002", "--pixel-error", "0.1"]).ends(2);
 }
