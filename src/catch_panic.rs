@@ -1,17 +1,17 @@
-//! Calls code of others that may panic on damaged input, and keeps the panic from being told as a fault of ours.
+//! Runs third-party code that may panic on damaged input, without the panic being printed as a fault of ours.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Once;
 
 thread_local! {
-    /// Whether a panic of this thread is expected and will be told as a fault of the file.
+    /// Whether a panic of this thread is expected and will be reported as a fault of the file.
     static EXPECTED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Does `work`; `None` when it panics. What it has changed by then must not be used.
+/// Runs `work`; `None` when it panics. State that `work` has changed by then must not be used.
 ///
-/// The panic hook is for the whole process, so that it is wrapped once and asks the thread whether to stay silent.
+/// The panic hook is process-wide: it is wrapped once, and looks up per thread whether to stay silent.
 pub(crate) fn attempt<T>(work: impl FnOnce() -> T) -> Option<T> {
     static WRAPPED: Once = Once::new();
     WRAPPED.call_once(|| {

@@ -1,19 +1,19 @@
-//! Arrays that are read anywhere, in large pages where the system gives them.
+//! Arrays with random access, in large pages where the system grants them.
 //!
-//! Rays visit the nodes of a tree in no order, and lookups the texels of a texture. A processor keeps the places of some
-//! thousand pages at hand: of an array of many megabytes it looks up most of them, and pages of two megabytes instead of
-//! four kilobytes spare that. Linux grants them on request where `/sys/kernel/mm/transparent_hugepage/enabled` says
-//! `madvise` or `always`; elsewhere these are arrays like others.
+//! Rays visit the nodes of a tree in no order, and lookups the texels of a texture. A processor caches the addresses of some
+//! thousand pages (its TLB): an array of many megabytes misses there almost always, and pages of two megabytes instead of
+//! four kilobytes avoid that. Linux grants them on request where `/sys/kernel/mm/transparent_hugepage/enabled` says
+//! `madvise` or `always`; elsewhere these are ordinary arrays.
 //!
 //! For arrays that are written and read once from end to end large pages do not pay (measured: loading and building took
 //! longer): two megabytes are cleared at once, long before the last of them is written. Pictures are decoded into them all
-//! the same, since lookups read them for as long as the picture takes.
+//! the same, since rays look up their texels until the render ends.
 //!
-//! Nor do they where memory must first be fetched: a virtual machine that tells its host of free memory (Linux, free page
-//! reporting) has given away just that of which large pages are made, and gets it back in small pieces. That takes 20 times
-//! as long as to clear it (measured: 4.5 ms a page instead of 0.2), where small pages are made of what was in use before.
-//! So some large pages of an array are made before the others, and no more of any once those that took long have taken more
-//! than [`allow`] says: what they are worth depends on how many rays will be sent.
+//! Nor do they pay where memory must first be fetched: a virtual machine that reports free memory to its host (Linux, free
+//! page reporting) has given away exactly the memory that large pages are made of, and gets it back in small pieces. That
+//! takes 20 times as long as clearing it (measured: 4.5 ms a page instead of 0.2), whereas small pages are made of memory that
+//! was in use before. So a few large pages of an array are made first as a trial, and no more of any once slow ones have taken
+//! longer than [`allow`] permits: what they are worth depends on how many rays will be sent.
 
 use std::fmt;
 use std::ops::{Deref, DerefMut};
@@ -23,32 +23,31 @@ use std::time::Duration;
 use bytemuck::Pod;
 use memmap2::MmapMut;
 
-/// Bytes of a large page.
+/// Size of a large page, in bytes.
 const PAGE: usize = 1 << 21;
 
-/// A large page is asked for from this many bytes on, and so it is for what is left over at the end: no more than twice the
-/// memory.
+/// Smallest number of bytes that a large page is requested for, also for the remainder at the end: at most twice the memory is
+/// used.
 const WORTH_PAGE: usize = PAGE / 2;
 
-/// A large page is dear if to make it takes the processor longer: twice as long as to make small ones in its place.
+/// Processor time beyond which making a large page counts as dear: twice as long as making small ones in its place.
 const DEAR: Duration = Duration::from_micros(1500);
 
-/// How many large pages of an array are made before it is written to, at most: every eighth, or fewer of a larger one. To make
-/// all of them takes longer, since they are out of the caches when they are written, and memory that is perhaps never used.
+/// Largest number of pages of an array that are made before it is written to: every eighth, or fewer of a larger one. Making
+/// all of them takes longer, as they have left the caches by the time they are written, and takes memory that may stay unused.
 #[cfg(target_os = "linux")]
 const TRIED: usize = 16;
 
-/// What dear pages may still take, nanoseconds of the processor.
+/// Processor time that dear pages may still take, in nanoseconds.
 static ALLOWANCE: AtomicU64 = AtomicU64::new(20_000_000);
 
-/// Lets large pages that are found to be dear take so much time of the processor from now on, all of them together; before,
-/// 20 ms.
+/// Sets the processor time that dear large pages may take from now on, all of them together; 20 ms until the first call.
 pub fn allow(time: Duration) {
     let nanoseconds = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
     ALLOWANCE.store(nanoseconds.max(1), Ordering::Relaxed);
 }
 
-/// A fixed number of `T`.
+/// Array of a fixed number of `T`.
 pub struct Paged<T> {
     memory: Memory<T>,
     len: usize,
@@ -60,7 +59,7 @@ enum Memory<T> {
 }
 
 impl<T: Pod> Paged<T> {
-    /// So many zeros.
+    /// Array of `len` zeros.
     pub fn zeroed(len: usize) -> Self {
         let is_worth_it = |bytes: &usize| *bytes >= WORTH_PAGE && ALLOWANCE.load(Ordering::Relaxed) > 0;
         let bytes = len.checked_mul(size_of::<T>()).filter(is_worth_it);
@@ -69,29 +68,29 @@ impl<T: Pod> Paged<T> {
     }
 }
 
-/// A map with large pages.
+/// Memory map with large pages.
 struct Large {
     map: MmapMut,
-    /// The byte that the first of them begins at.
+    /// Offset of the first large page in the map, in bytes.
     start: usize,
 }
 
 #[cfg(target_os = "linux")]
 impl Large {
-    /// Room for so many bytes, if the system has large pages. One is dear that takes longer to be made than `dear`; behind the
-    /// one that takes the last of the allowance, pages are small.
+    /// Allocates `bytes` bytes if the system has large pages. A page that takes longer than `dear` to make is dear; once dear
+    /// pages have used up the allowance, the array gets small pages.
     fn new(bytes: usize, dear: Duration, allowance: &AtomicU64) -> Option<Self> {
         use crate::stopwatch::Stopwatch;
         use memmap2::Advice;
         let whole = if bytes % PAGE >= WORTH_PAGE { bytes.checked_next_multiple_of(PAGE)? } else { bytes };
-        // Nothing is ever written to what lies before the first large page and behind the last: it takes no memory.
+        // The bytes before the first large page and behind the last are never written, so they take no memory.
         let mut map = MmapMut::map_anon(whole.checked_add(PAGE)?).ok()?;
         let start = map.as_ptr().align_offset(PAGE);
         map.advise_range(Advice::HugePage, start, whole).ok()?;
         let apart = (whole / PAGE / TRIED).max(8);
         let are_dear = map[start..][..whole].chunks_exact_mut(PAGE).step_by(apart).any(|page| {
             let watch = Stopwatch::of_this_thread();
-            // The system makes a page when it is written to.
+            // The system makes a page on the first write to it.
             page[0] = 0;
             let took = watch.read().cpu;
             took > dear && !spend(allowance, took)
@@ -103,7 +102,7 @@ impl Large {
     }
 }
 
-/// Takes some time out of an allowance; whether any is left.
+/// Takes `time` out of an allowance; returns whether any is left.
 #[cfg(target_os = "linux")]
 fn spend(allowance: &AtomicU64, time: Duration) -> bool {
     let nanoseconds = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
@@ -119,7 +118,7 @@ impl Large {
 }
 
 impl<T> From<Vec<T>> for Paged<T> {
-    /// What is there already stays where it is.
+    /// Wraps the vector without copying it.
     fn from(items: Vec<T>) -> Self {
         Self { len: items.len(), memory: Memory::Usual(items) }
     }
@@ -144,7 +143,7 @@ impl<T: Pod> Deref for Paged<T> {
     fn deref(&self) -> &[T] {
         match &self.memory {
             Memory::Usual(items) => items,
-            // From a multiple of a page on, and as long as so many items: no cast can fail.
+            // `start` is a multiple of the page size and the length fits the items: the cast cannot fail.
             Memory::Large(Large { map, start }) => {
                 bytemuck::cast_slice(&map[*start..*start + self.len * size_of::<T>()])
             }
@@ -181,7 +180,7 @@ impl<T: Pod + fmt::Debug> fmt::Debug for Paged<T> {
 mod tests {
     use super::*;
 
-    /// As large as a node.
+    /// Item as large as a node.
     type Item = [u32; 64];
 
     #[test]
@@ -211,7 +210,7 @@ mod tests {
         assert!(matches!(Paged::<u8>::zeroed(WORTH_PAGE - 1).memory, Memory::Usual(_)));
     }
 
-    /// How many kibibytes of the map are in large pages.
+    /// Size of the part of the map that is in large pages, in kibibytes.
     #[cfg(target_os = "linux")]
     fn kibibytes_in_large_pages(large: &Large) -> u64 {
         let from = format!("{:x}-", large.map.as_ptr().addr() + large.start);

@@ -1,18 +1,18 @@
-//! Whether a JPEG picture is all there: its decoder leaves what is missing grey or coarse, and says nothing.
+//! Detects truncated JPEG pictures: the decoder fills missing parts with grey or coarse data and reports nothing.
 
-/// Whether the data of a JPEG picture has no end (marker EOI; ITU-T T.81, *Digital Compression and Coding of Continuous-Tone
+/// Whether the data of a JPEG picture lacks its end (marker EOI; ITU-T T.81, *Digital Compression and Coding of Continuous-Tone
 /// Still Images*, 1992, B.1.1.3).
 pub(crate) fn is_cut_off(bytes: &[u8]) -> bool {
-    /// Start of a scan: behind its header are coded numbers, in which no other marker is but those between parts of them.
+    /// Start of a scan: its header is followed by entropy-coded data, which holds no markers except those between its parts.
     const SOS: u8 = 0xda;
     const EOI: [u8; 2] = [0xff, 0xd9];
-    // Behind SOI. Segments may hold pictures with ends of their own, small ones for previews.
+    // Skip SOI. Segments may hold pictures with EOIs of their own, such as previews.
     let mut rest = bytes.get(2..).unwrap_or_default();
     loop {
         rest = match rest {
-            // Any number of these may stand before a marker.
+            // Any number of fill bytes may stand before a marker.
             [0xff, 0xff, ..] => &rest[1..],
-            // No marker: for the decoder to judge.
+            // Not a marker: left to the decoder.
             [0xff, 0, ..] => return false,
             [0xff, SOS, ..] => return !rest.windows(2).rev().any(|pair| pair == EOI),
             [0xff, _, high, low, ..] => {

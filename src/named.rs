@@ -1,17 +1,17 @@
-//! Kinds whose values have names: as they are typed, and as they are printed.
+//! Enums whose values have names, as typed and as printed.
 
 use std::str::FromStr;
 
-/// A kind whose values have names.
+/// An enum whose values have names.
 pub trait Named: FromStr<Err = UnknownName> + Clone + Send + Sync + 'static {
-    /// What each of them is, in words.
+    /// What a value is, in words.
     const WHAT: &'static str;
 
     /// All names, in the order of the help text.
     fn names() -> impl Iterator<Item = &'static str>;
 }
 
-/// A name that nothing of its kind has.
+/// A name that no value of its enum has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no {what} is named {name:?}; there are: {names}")]
 pub struct UnknownName {
@@ -21,21 +21,21 @@ pub struct UnknownName {
 }
 
 impl UnknownName {
-    /// A name that no `T` has.
+    /// Error for a name that no `T` has.
     pub fn of<T: Named>(name: &str) -> Self {
         Self { what: T::WHAT, name: name.into(), names: T::names().collect::<Vec<_>>().join(", ") }
     }
 }
 
-/// Names every value of an `enum`, in the order of the help text, after a word for what each of them is. So they are
-/// listed in `ALL`, read and printed.
+/// Names every value of an `enum`, in the order of the help text, after a word for what a value is. Generates `ALL`, parsing
+/// and printing.
 macro_rules! names {
     ($kind:ident, $what:literal, $($value:ident => $name:literal),+ $(,)?) => {
         impl $kind {
-            /// Every one, in the order of the help text.
+            /// Every value, in the order of the help text.
             pub const ALL: [Self; [$($name),+].len()] = [$(Self::$value),+];
 
-            /// As typed and printed.
+            /// Name as typed and printed.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$value => $name),+ }
             }

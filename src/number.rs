@@ -1,23 +1,23 @@
-//! Numbers as people read them.
+//! Numbers formatted for people.
 
-/// Digits in threes: `1 234 567`.
+/// Groups digits in threes: `1 234 567`.
 pub fn grouped(n: u64) -> String {
     let digits = n.to_string();
     let groups: Vec<&str> = digits.as_bytes().rchunks(3).rev().filter_map(|c| std::str::from_utf8(c).ok()).collect();
     groups.join(" ")
 }
 
-/// The hash of what was read, as it is written everywhere: 32 hexadecimal digits.
+/// Formats the hash of the input as it is written everywhere: 32 hexadecimal digits.
 pub fn hash(hash: u128) -> String {
     format!("{hash:032x}")
 }
 
-/// So many of what is called `one`: `1 ray`, `4 rays`.
+/// Count with its noun, where `one` is the singular: `1 ray`, `4 rays`.
 pub fn so_many(n: u64, one: &str) -> String {
     format!("{} {one}{}", grouped(n), if n == 1 { "" } else { "s" })
 }
 
-/// About three digits in at most eight characters; `-` for what is not known.
+/// Formats about three digits in at most eight characters; `-` for infinities and NaN.
 pub fn short(x: f64) -> String {
     match x {
         x if !x.is_finite() => "-".into(),
@@ -32,12 +32,12 @@ pub fn short(x: f64) -> String {
     }
 }
 
-/// A number of things that was computed, rounded up.
+/// Formats a computed number of things, rounded up.
 pub fn whole(x: f64) -> String {
     if x.is_finite() && x < 1e15 { grouped(rounded(x.ceil())) } else { short(x) }
 }
 
-/// Millionths up to thousands with their unit, for times.
+/// Formats seconds, with the unit that fits, from millionths up to thousands.
 pub fn seconds(s: f64) -> String {
     match s {
         s if !s.is_finite() => "-".into(),
@@ -48,7 +48,7 @@ pub fn seconds(s: f64) -> String {
     }
 }
 
-/// Bytes in the unit that fits: 1 kB is 1000 bytes.
+/// Formats bytes in the unit that fits: 1 kB is 1000 bytes.
 pub fn bytes(n: u64) -> String {
     match n as f64 {
         n if n < 1e3 => format!("{n} B"),

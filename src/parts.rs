@@ -1,19 +1,19 @@
-//! Lists that several threads make or fill, each its own part.
+//! Lists that several threads build or fill, each its own part.
 
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
-/// Parts of so many items each, of a list that is as long as all of them.
+/// Cuts a list into consecutive parts of the given lengths, which add up to the length of the list.
 pub(crate) fn cut<T>(mut all: &mut [T], lengths: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
     lengths.map(|length| all.split_off_mut(..length).unwrap_or_default()).collect()
 }
 
-/// All lists as one; a single one is not copied.
+/// Concatenates lists; a single list is not copied.
 pub(crate) fn joined<T: Copy + Zeroable + Send + Sync>(mut lists: Vec<Vec<T>>) -> Vec<T> {
     if lists.len() == 1 {
         return lists.pop().unwrap_or_default();
     }
-    // Its pages are made by the threads that write there.
+    // The threads that fill the parts are the ones that touch the pages first.
     let mut all: Vec<T> = bytemuck::zeroed_vec(lists.iter().map(Vec::len).sum());
     let parts = cut(&mut all, lists.iter().map(Vec::len));
     parts.into_par_iter().zip(lists).for_each(|(part, list)| part.copy_from_slice(&list));

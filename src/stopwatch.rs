@@ -1,17 +1,17 @@
-//! Time by the clock on the wall and by the processor: where a picture's time went.
+//! Wall-clock and processor time: what the time of a picture was spent on.
 //!
-//! Stages are told apart by a handful of readings a picture, so that nobody pays for a profile that was not asked for.
+//! Stages are told apart by a handful of readings a picture, so that a profile costs nothing when it was not requested.
 
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Sub};
 use std::time::{Duration, Instant};
 
-/// Time that something took.
+/// Time spent on a piece of work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Spent {
-    /// By the clock on the wall.
+    /// Wall-clock time.
     pub wall: Duration,
-    /// By the processors, all threads together; zero where the system does not say (anything but Unix and Windows).
+    /// Processor time, all threads together; zero where the system does not report it (anything but Unix and Windows).
     pub cpu: Duration,
 }
 
@@ -29,7 +29,7 @@ impl AddAssign for Spent {
     }
 }
 
-/// What is left of a stage without a part of it; never negative, though two clocks may disagree.
+/// Time of a stage without one of its parts; never negative, though two clocks may disagree.
 impl Sub for Spent {
     type Output = Self;
 
@@ -52,7 +52,7 @@ pub struct Stopwatch {
     cpu: Duration,
 }
 
-/// Whose time of the processor is told.
+/// Whose processor time a watch measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Whose {
     Process,
@@ -60,12 +60,12 @@ enum Whose {
 }
 
 impl Stopwatch {
-    /// Starts to take the time of all threads together.
+    /// Starts a watch for the time of all threads together.
     pub fn of_all_threads() -> Self {
         Self::start(Whose::Process)
     }
 
-    /// Starts to take the time of this thread; [`Self::read`] it on the same.
+    /// Starts a watch for the time of this thread; call [`Self::read`] on the same thread.
     pub fn of_this_thread() -> Self {
         Self::start(Whose::Thread)
     }
@@ -74,12 +74,12 @@ impl Stopwatch {
         Self { whose, wall: Instant::now(), cpu: processor(whose) }
     }
 
-    /// The time since the start.
+    /// Time since the start.
     pub fn read(&self) -> Spent {
         Spent { wall: self.wall.elapsed(), cpu: processor(self.whose).saturating_sub(self.cpu) }
     }
 
-    /// The time since the start or the last lap.
+    /// Time since the start or the last lap.
     pub fn lap(&mut self) -> Spent {
         let spent = self.read();
         self.wall += spent.wall;
@@ -88,7 +88,7 @@ impl Stopwatch {
     }
 }
 
-/// What the processors have spent on the process so far, from before its first instruction.
+/// Processor time of the process so far, from before its first instruction.
 pub fn processor_since_start() -> Duration {
     processor(Whose::Process)
 }
@@ -103,7 +103,7 @@ fn processor(whose: Whose) -> Duration {
     time.map(Duration::from).unwrap_or_default()
 }
 
-/// Of a thread the time on the wall: what Windows counts of one are whole ticks, about sixty-four a second.
+/// Processor time; for a thread the wall-clock time, as Windows counts threads in whole ticks, about sixty-four a second.
 #[cfg(not(unix))]
 fn processor(whose: Whose) -> Duration {
     static FIRST: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
@@ -116,7 +116,7 @@ fn processor(whose: Whose) -> Duration {
     }
 }
 
-/// The most memory the process has held at once, bytes; only Linux tells.
+/// Peak memory of the process, in bytes; only Linux reports it.
 pub fn peak_memory() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

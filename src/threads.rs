@@ -1,15 +1,15 @@
-//! Worker threads, and where they run.
+//! Worker threads and their processor affinity.
 //!
-//! A pool that has one thread for every processor of the process keeps each thread on its own. Left to itself Linux wakes
-//! threads of a short job where their waker runs: while one works the other waits for the same processor, idle threads
-//! that look for work before they sleep keep it from being moved, and an idle processor stands beside them. Building over
+//! A pool that has one thread for every processor of the process pins each thread to its own. Left to itself, Linux wakes
+//! the threads of a short job on the processor of their waker: while one works the other waits for the same processor, idle
+//! threads that look for work before they sleep keep it from being moved, and another processor stays idle. Building over
 //! 70,000 triangles took two threads as long as one that way.
 
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
-/// A pool of so many threads; 0: of as many as there are processors that this process may use.
+/// Builds a pool of `threads` threads; 0 means as many as there are processors that this process may use.
 ///
-/// Threads that are started by its threads run where these do, unless by [`anywhere`].
+/// Threads that are started by its threads inherit their affinity, unless they are started in [`anywhere`].
 ///
 /// # Errors
 /// If the system starts no more threads.
@@ -24,15 +24,15 @@ pub fn pool(threads: usize) -> Result<ThreadPool, ThreadPoolBuildError> {
     ThreadPoolBuilder::new().num_threads(threads).start_handler(keep).build()
 }
 
-/// Processors that this process may use, at least 1; fewer where a container gives it only a part of their time.
+/// Number of processors that this process may use, at least 1; fewer where a container limits their time.
 pub fn available() -> usize {
     let anywhere = || std::thread::available_parallelism().map_or(1, usize::from);
     self::anywhere(anywhere)
 }
 
-/// Does something that starts threads of its own: they run on any processor, whatever thread this is.
+/// Runs `work`, which starts threads of its own: they run on any processor, whatever this thread is pinned to.
 pub fn anywhere<T>(work: impl FnOnce() -> T) -> T {
-    /// Back to where the thread was, also when the work panics.
+    /// Restores the affinity of the thread, also when the work panics.
     struct Back(Vec<usize>);
     impl Drop for Back {
         fn drop(&mut self) {
@@ -54,22 +54,22 @@ mod processors {
     use nix::unistd::Pid;
     use std::sync::OnceLock;
 
-    /// Of all systems' answers to these calls none is worth a message: threads run somewhere else then.
+    /// The calling thread. Errors of the calls are ignored: threads then run on other processors.
     const THIS_THREAD: Pid = Pid::from_raw(0);
 
-    /// Those that the process may use: where the first thread that asked may run.
+    /// Processors of the process: the affinity of the first thread that called this.
     pub(super) fn all() -> &'static [usize] {
         static ALL: OnceLock<Vec<usize>> = OnceLock::new();
         ALL.get_or_init(of_this_thread)
     }
 
-    /// Those that this thread may use; empty where that is unknown.
+    /// Processors that this thread may use; empty where that is unknown.
     pub(super) fn of_this_thread() -> Vec<usize> {
         let set = sched_getaffinity(THIS_THREAD).unwrap_or_default();
         (0..CpuSet::count()).filter(|&i| set.is_set(i).unwrap_or(false)).collect()
     }
 
-    /// Lets this thread run on these.
+    /// Restricts this thread to `processors`.
     pub(super) fn keep_to(processors: &[usize]) {
         let mut set = CpuSet::new();
         let known = processors.iter().all(|&i| set.set(i).is_ok());
@@ -81,7 +81,7 @@ mod processors {
 
 #[cfg(not(target_os = "linux"))]
 mod processors {
-    //! Other systems are not asked.
+    //! No affinity on other systems.
 
     pub(super) fn all() -> &'static [usize] {
         &[]

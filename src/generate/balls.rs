@@ -1,11 +1,11 @@
-//! Balls on balls: each carries nine of a third of its size, and the first stands on a floor.
+//! Balls on balls: each carries nine of a third of its size; the first stands on a floor.
 
 use super::solid::Solid;
 use super::{paint, standing};
 use crate::math::{DAffine3, DQuat, DVec3, Vec3};
 use crate::scene::Scene;
 
-/// (1 + 9 + 81 + …) balls of 8 · 4^k triangles each, and a floor of two.
+/// Scene of (1 + 9 + 81 + …) balls of 8 · 4^k triangles each, and a floor of two.
 pub(super) fn scene(wanted: usize) -> Scene {
     let (depth, level) = shape(wanted);
     let ball = Solid::sphere(1.0, level);
@@ -20,13 +20,13 @@ pub(super) fn scene(wanted: usize) -> Scene {
     standing(vec![solid.mesh("balls", 0), floor.mesh("floor", 1)], materials)
 }
 
-/// Depth of the growth and fineness of the balls whose product is nearest to what is wanted.
+/// Recursion depth and subdivision level of the balls whose number of triangles is nearest to `wanted`.
 fn shape(wanted: usize) -> (u32, u32) {
     let all = (0..=5).flat_map(|depth| (0..=6).map(move |level| (depth, level)));
     let far = |(depth, level): (u32, u32)| {
         let balls = (9f64.powi(depth as i32 + 1) - 1.0) / 8.0;
         let ratio = (balls * 8.0 * 4f64.powi(level as i32) / wanted as f64).ln().abs();
-        // Of two as near, the one with more balls; very coarse and very fine balls count as farther.
+        // Of two equally near, the one with more balls; very coarse and very fine balls count as farther.
         ratio + if level == 0 { 0.3 } else { 0.02 * f64::from(level) }
     };
     all.min_by(|&a, &b| far(a).total_cmp(&far(b))).unwrap_or((1, 1))
@@ -39,7 +39,7 @@ fn grow(solid: &mut Solid, ball: &Solid, center: DVec3, radius: f64, up: DVec3, 
     }
     let across = up.any_orthonormal_vector();
     let side = up.cross(across);
-    // Six around the middle, three above them and between.
+    // Six around the equator, three above them and in between.
     let around = (0..6).map(|i| (f64::from(i) / 6.0, 0.0)).chain((0..3).map(|i| ((f64::from(i) + 0.25) / 3.0, 0.87)));
     for (turn, height) in around {
         let (sin, cos) = super::solid::turned(turn);

@@ -5,10 +5,10 @@ use super::{paint, standing};
 use crate::math::{DAffine3, DQuat, DVec3, Vec3};
 use crate::scene::Scene;
 
-/// Triangles of a wheel for each of its teeth.
+/// Triangles of a wheel per tooth.
 const PER_TOOTH: usize = 32;
 
-/// Wheels of 24 teeth, fewer where little is wanted.
+/// Scene of wheels of 24 teeth, fewer where `wanted` is small.
 pub(super) fn scene(wanted: usize) -> Scene {
     let teeth = (wanted / PER_TOOTH).clamp(3, 24) / 2 * 2;
     let teeth = teeth.max(4);
@@ -20,7 +20,7 @@ pub(super) fn scene(wanted: usize) -> Scene {
     for i in 0..count {
         let (x, y, z) = (i % side, i / side % side, i / (side * side));
         let second = (x + y) % 2 == 1;
-        // Teeth of one in the gaps of the other, whose outline runs the other way round: a quarter of a tooth and gap.
+        // Teeth of one fit into gaps of the other, whose outline runs the opposite way: turn by a quarter of a tooth and gap.
         let turn = if second { std::f64::consts::FRAC_PI_2 / teeth as f64 } else { 0.0 };
         let at = DVec3::new(x as f64 * 2.0, y as f64 * 2.0, z as f64 * 0.7);
         let solid = if second { &mut odd } else { &mut even };
@@ -33,10 +33,10 @@ pub(super) fn scene(wanted: usize) -> Scene {
     standing(meshes.map(|(solid, name, material)| solid.mesh(name, material)).collect(), materials)
 }
 
-/// A wheel around z whose teeth reach from 0.9 to 1.08, with a hole of 0.4.
+/// A wheel around z whose teeth reach from radius 0.9 to 1.08, with a hole of radius 0.4.
 fn wheel(teeth: usize) -> Solid {
     let mut solid = Solid::default();
-    // Four points a tooth, outside and around the hole, below and above.
+    // Four points per tooth, on the outline and around the hole, below and above.
     let outline = |i: usize| if i % 4 < 2 { 0.9 } else { 1.08 };
     let n = 4 * teeth;
     let ring = |solid: &mut Solid, radius: &dyn Fn(usize) -> f64, z: f64| -> Vec<u32> {

@@ -1,4 +1,4 @@
-//! One pot, many times: a mesh of two thousand triangles placed as often as it takes.
+//! One pot, many times: a mesh of two thousand triangles, instanced as often as needed.
 
 use super::paint;
 use super::pot::pot;
@@ -6,7 +6,7 @@ use crate::math::random::Random;
 use crate::math::{DAffine3, DQuat, DVec3, Vec3};
 use crate::scene::{Instance, Scene, UpAxis};
 
-/// Pots of 2,000 triangles, of fewer where little is wanted, on a square.
+/// Scene of pots of 2,000 triangles, fewer where `wanted` is small, on a square lattice.
 pub(super) fn scene(wanted: usize) -> Scene {
     let mesh = pot((wanted / 4).clamp(100, 2000)).mesh("pot", 0);
     let count = (wanted as f64 / mesh.triangles.len() as f64).round().max(1.0) as usize;

@@ -1,7 +1,7 @@
-//! Families of scenes of any size, for asking how cost grows with the number of triangles.
+//! Families of scenes of any size, to measure how cost grows with the number of triangles.
 //!
 //! After the Standard Procedural Databases (E. Haines, *A Proposal for Standard Graphics Environments*, 1987), as
-//! triangles: every family takes the number that is wanted and comes as near to it as its rule allows. All are formulas
+//! triangles: every family takes the wanted number of triangles and comes as near to it as its rule allows. All are formulas
 //! with fixed random streams: the same on every machine.
 
 mod balls;
@@ -18,10 +18,10 @@ use crate::math::{DAffine3, Vec3};
 use crate::named::names;
 use crate::scene::{Instance, Material, Mesh, MetalRough, Reflection, Scene, UpAxis};
 
-/// The most triangles that can be asked for.
+/// Largest number of triangles of a scene.
 pub const MAX_TRIANGLES: usize = 10_000_000;
 
-/// A kind of scene.
+/// A family of scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// Tetrahedra within a tetrahedron: even in space, much of it empty.
@@ -52,7 +52,7 @@ names!(
 );
 
 impl Family {
-    /// The scene of about `triangles` triangles, 1 to [`MAX_TRIANGLES`], z upwards.
+    /// Builds the scene of about `triangles` triangles, clamped to 1 to [`MAX_TRIANGLES`], z upwards.
     pub fn scene(self, triangles: usize) -> Scene {
         let wanted = triangles.clamp(1, MAX_TRIANGLES);
         match self {
@@ -67,18 +67,18 @@ impl Family {
     }
 }
 
-/// Triangles in a scene, instances counted each.
+/// Number of triangles in a scene, each instance counted.
 pub fn triangles(scene: &Scene) -> usize {
     scene.instances.iter().map(|i| scene.meshes[i.mesh as usize].triangles.len()).sum()
 }
 
-/// A matt or glossy colour.
+/// Material of one matt or glossy colour.
 fn paint(name: &str, base_color: Vec3, metallic: f32, roughness: f32) -> Material {
     let reflection = Reflection::MetalRough(MetalRough { metallic, roughness, ..MetalRough::default() });
     Material { name: name.into(), base_color, double_sided: true, reflection, ..Material::default() }
 }
 
-/// Meshes where they are, one instance each.
+/// Scene with one untransformed instance of each mesh.
 fn standing(meshes: Vec<Mesh>, materials: Vec<Material>) -> Scene {
     #[expect(clippy::cast_possible_truncation, reason = "a handful of meshes")]
     let instance = |(i, mesh): (usize, &Mesh)| Instance {
@@ -100,7 +100,7 @@ mod tests {
             for wanted in [1000, 5000, 20_000, 100_000] {
                 let scene = family.scene(wanted);
                 let ratio = triangles(&scene) as f64 / wanted as f64;
-                // Families of powers come as near as the factor between two of them allows.
+                // Families of powers come as near as the ratio of two successive powers allows.
                 assert!((0.45..2.2).contains(&ratio), "{family} {wanted}: {}", triangles(&scene));
                 let finite = scene.meshes.iter().flat_map(|m| &m.positions).all(|p| p.is_finite());
                 let sound = scene.meshes.iter().all(|m| {

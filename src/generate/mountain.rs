@@ -6,7 +6,7 @@ use crate::math::random::Random;
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::scene::{Material, MetalRough, Reflection, Scene};
 
-/// 2 · n² triangles and four balls.
+/// Scene of 2 · n² triangles and four balls.
 pub(super) fn scene(wanted: usize) -> Scene {
     let level = match wanted {
         0..10_000 => 2,
@@ -45,7 +45,7 @@ pub(super) fn scene(wanted: usize) -> Scene {
     standing(vec![ground.mesh("mountain", 0), balls.mesh("balls", 1)], materials)
 }
 
-/// Noise of random heights on lattices, each twice as fine and half as high as the one before, down to the grid's own.
+/// Height from value noise on lattices, each twice as fine and half as high as the one before, down to the grid's own.
 /// (K. Perlin, *An Image Synthesizer*, 1985, with values for gradients.)
 fn height(x: f64, y: f64, n: usize) -> f64 {
     let (mut sum, mut scale, mut cells) = (0.0, 0.45, 2u32);
@@ -63,7 +63,7 @@ fn height(x: f64, y: f64, n: usize) -> f64 {
     sum
 }
 
-/// −0.5 to 0.5.
+/// Random value of a lattice point, −0.5 to 0.5.
 fn lattice(i: u64, j: u64, cells: u32) -> f64 {
     f64::from(Random::new(u64::from(cells) << 40 ^ i << 20 ^ j).unit()) - 0.5
 }

@@ -1,9 +1,9 @@
-//! A pot with spout and handle: detail in all directions, in one piece of any fineness.
+//! A pot with spout and handle: detail in all directions, as one mesh of any fineness.
 
 use super::solid::Solid;
 use crate::math::{DAffine3, DVec3};
 
-/// The finest pot of at most `wanted` triangles, and never coarser than 100; about 1 wide, its foot on z = 0.
+/// Finest pot of at most `wanted` triangles, but never coarser than 100; about 1 wide, its foot on z = 0.
 pub(super) fn pot(wanted: usize) -> Solid {
     let columns = (5..).take_while(|&c| triangles(c) <= wanted.max(triangles(5))).last().unwrap_or(5);
     let mut pot = Solid::lathe(columns, columns, body);
@@ -24,12 +24,12 @@ fn triangles(columns: usize) -> usize {
     2 * columns * columns - 2 * columns + 2 * (columns / 2) * (columns / 2) + 2 * columns * around_handle(columns)
 }
 
-/// One column around it would have faces without an area.
+/// Columns around the handle. A single one would give faces without area.
 fn around_handle(columns: usize) -> usize {
     (columns / 3).max(2)
 }
 
-/// Belly, shoulder, lid and knob, from the foot up.
+/// Profile of belly, shoulder, lid and knob, from the foot up.
 fn body(s: f64) -> (f64, f64) {
     if s == 0.0 || s == 1.0 {
         return (0.0, if s == 0.0 { 0.0 } else { 0.66 });

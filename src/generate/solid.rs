@@ -11,12 +11,12 @@ pub(super) struct Solid {
 }
 
 impl Solid {
-    /// How many triangles there are.
+    /// Number of triangles.
     pub(super) fn len(&self) -> usize {
         self.triangles.len()
     }
 
-    /// Adds a point and tells its number.
+    /// Adds a point and returns its index.
     pub(super) fn point(&mut self, p: DVec3) -> u32 {
         self.points.push(p);
         index(self.points.len() - 1)
@@ -26,26 +26,26 @@ impl Solid {
         self.triangles.push([a, b, c]);
     }
 
-    /// Two triangles; the corners run round.
+    /// Adds two triangles; the corners run around the quad.
     pub(super) fn quad(&mut self, a: u32, b: u32, c: u32, d: u32) {
         self.triangles.extend([[a, b, c], [a, c, d]]);
     }
 
-    /// Adds another solid somewhere else.
+    /// Adds a transformed copy of another solid.
     pub(super) fn place(&mut self, other: &Self, at: &DAffine3) {
         let first = index(self.points.len());
         self.points.extend(other.points.iter().map(|p| at.transform_point3(*p)));
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + first)));
     }
 
-    /// The finished mesh, coordinates rounded to `f32`.
+    /// Returns the finished mesh, its coordinates rounded to `f32`.
     pub(super) fn mesh(self, name: &str, material: u32) -> Mesh {
         let positions = self.points.into_iter().map(|p| -> Vec3 { p.as_vec3() }).collect();
         Mesh { name: name.into(), material, positions, triangles: self.triangles, ..Mesh::default() }
     }
 
-    /// A net of points, `rows` × `columns`, closed round in the columns; each row runs counter-clockwise seen from the
-    /// next. `at` gives the point of a row (0..=1) and turn (0..1); a row whose radius is nothing becomes one point.
+    /// Builds a net of points, `rows` × `columns`, closed around the columns; each row runs counter-clockwise seen from the
+    /// next. `at` gives the point of a row (0..=1) and turn (0..1); a row whose radius is zero becomes one point.
     fn net(rows: usize, columns: usize, at: impl Fn(f64, f64) -> DVec3, pole: impl Fn(usize) -> bool) -> Self {
         let mut solid = Self::default();
         let mut before: Vec<u32> = Vec::new();
@@ -70,8 +70,8 @@ impl Solid {
         solid
     }
 
-    /// The surface that a profile of (radius, height), from the bottom up, makes around the z axis. Profiles may start and
-    /// end on the axis; 2 · `rows` · `columns` triangles less one row's worth for each end that does.
+    /// Builds the surface of revolution of a profile of (radius, height), from the bottom up, around the z axis. Profiles may
+    /// start and end on the axis; 2 · `rows` · `columns` triangles less one row's worth for each end that does.
     pub(super) fn lathe(rows: usize, columns: usize, profile: impl Fn(f64) -> (f64, f64)) -> Self {
         let at = |s: f64, turn: f64| {
             let (r, z) = profile(s);
@@ -82,7 +82,7 @@ impl Solid {
         Self::net(rows, columns, at, pole)
     }
 
-    /// A sphere around the origin, (8 · 4^`level`) triangles: an octahedron whose faces are cut into four, again and again.
+    /// Builds a sphere around the origin, (8 · 4^`level`) triangles: an octahedron whose faces are recursively cut into four.
     pub(super) fn sphere(radius: f64, level: u32) -> Self {
         let mut solid = Self::default();
         for [x, y, z] in (0..8).map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 0 { 1.0 } else { -1.0 })) {
@@ -93,7 +93,7 @@ impl Solid {
         solid
     }
 
-    /// A face of the unit octahedron in `n`² parts, on the sphere.
+    /// Adds a face of the unit octahedron, cut into `n`² triangles and projected onto the sphere.
     fn facet(&mut self, [a, b, c]: [DVec3; 3], n: u32, radius: f64) {
         let first = index(self.points.len());
         for row in 0..=n {
@@ -113,7 +113,7 @@ impl Solid {
         }
     }
 
-    /// A tube along `path` (0..=1) of radius `radius`, open at both ends: 2 · `rows` · `columns` triangles. The path must
+    /// Builds a tube along `path` (0..=1) of radius `radius`, open at both ends: 2 · `rows` · `columns` triangles. The path must
     /// not run along `side`.
     pub(super) fn tube(
         rows: usize,
@@ -133,7 +133,7 @@ impl Solid {
     }
 }
 
-/// Sine and cosine of so many turns.
+/// Sine and cosine of an angle in turns.
 pub(super) fn turned(turns: f64) -> (f64, f64) {
     let angle = turns * std::f64::consts::TAU;
     (libm::sin(angle), libm::cos(angle))
@@ -148,7 +148,7 @@ fn index(i: usize) -> u32 {
 mod tests {
     use super::*;
 
-    /// Six times the volume that closed surfaces hold; positive when they face outwards.
+    /// Six times the volume enclosed by closed surfaces; positive when they face outwards.
     fn volume(solid: &Solid) -> f64 {
         let p = |i: u32| solid.points[i as usize];
         solid.triangles.iter().map(|&[a, b, c]| p(a).dot(p(b).cross(p(c)))).sum::<f64>() / 6.0
@@ -180,7 +180,7 @@ mod tests {
     #[test]
     fn a_tube_faces_outwards() {
         let tube = Solid::tube(4, 32, DVec3::X, |s| DVec3::Z * s, |_| 0.5);
-        // Open ends add nothing at z = 0, and π r²/3 is missing at z = 1.
+        // The open end at z = 0 contributes nothing, the one at z = 1 lacks π r²/3.
         let expected = std::f64::consts::PI * 0.25 * 2.0 / 3.0;
         assert!((volume(&tube) / expected - 1.0).abs() < 0.02, "{}", volume(&tube));
     }

@@ -1,14 +1,14 @@
-//! Sierpiński's tetrahedron: four copies of half the size, again and again.
+//! Sierpiński's tetrahedron: four copies of half the size, recursively.
 
 use super::solid::Solid;
 use super::{paint, standing};
 use crate::math::{DVec3, Vec3};
 use crate::scene::Scene;
 
-/// 4 · 4^n triangles.
+/// Scene of 4 · 4^n triangles.
 pub(super) fn scene(wanted: usize) -> Scene {
     let mut level = 0;
-    // The nearer of two powers in ratio: between n and 4 n that is 2 n.
+    // The nearer of two powers in ratio: between n and 4 n the limit is 2 n.
     while 4usize.pow(level + 1) * 2 < wanted {
         level += 1;
     }

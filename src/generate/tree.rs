@@ -14,14 +14,14 @@ struct Branch {
     radius: f64,
 }
 
-/// 48 triangles a branch, and the floor.
+/// Scene of 48 triangles a branch, and the floor.
 pub(super) fn scene(wanted: usize) -> Scene {
     let branches = ((wanted.saturating_sub(2) + 24) / 48).max(1);
     let knot = Solid::sphere(1.0, 1);
     let mut random = Random::new(11);
     let mut solid = Solid::default();
     let mut waiting = VecDeque::from([Branch { from: DVec3::ZERO, along: DVec3::Z * 2.0, radius: 0.2 }]);
-    // The thickest first, so that any number of branches makes a whole tree.
+    // The thickest first, so that any number of branches makes a complete tree.
     for _ in 0..branches {
         let Some(Branch { from, along, radius }) = waiting.pop_front() else { break };
         let (side, end) = (along.any_orthonormal_vector(), from + along);

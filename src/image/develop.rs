@@ -1,45 +1,45 @@
-//! Linear pixels -> coded samples for display formats: un-premultiply, expose, tone map, lay the background behind,
-//! apply the sRGB curve. Rows are independent, so threads do not show in the result.
+//! Linear pixels -> coded samples for display formats: un-premultiply, expose, tone map, composite over the background,
+//! apply the sRGB curve. Rows are independent, so the result does not depend on threads.
 
 use super::srgb;
 use super::{Output, Picture};
 use crate::math::simd::{Kernel, LANES, Level, Simd};
 use rayon::prelude::*;
 
-/// Coded samples, rows from the top, 3 (opaque) or 4 channels each pixel; alpha is straight.
+/// Coded samples, rows from the top, 3 (opaque) or 4 channels per pixel; alpha is straight.
 pub(super) struct Raster<T> {
     /// Columns.
     pub(super) width: u32,
     /// Rows.
     pub(super) height: u32,
-    /// 3 or 4.
+    /// Channels per pixel, 3 or 4.
     pub(super) channels: u32,
     /// `width × height × channels` samples.
     pub(super) samples: Vec<T>,
 }
 
-/// Pixels that are developed together: so many that loops over them stay loops, which become lanes; fewer would be unrolled.
+/// Pixels developed together: enough that loops over them are vectorized; loops over fewer would be unrolled.
 const TOGETHER: usize = 64;
 
-/// A number of each of them.
+/// One channel of [`TOGETHER`] pixels.
 type Channel = [f32; TOGETHER];
 
 /// A coded sample: 8 or 16 bits.
 pub(super) trait Sample: Copy + Default + Eq + Send + Sync {
     /// The largest code.
     const MAX: Self;
-    /// As a number.
+    /// The largest code, as `f32`.
     const STEPS: f32;
-    /// The codes of linear light on the sRGB curve.
+    /// Codes of linear light on the sRGB curve.
     fn codes(linear: &Channel) -> [Self; TOGETHER];
     /// Code of a coverage 0..=1; not on the sRGB curve.
     fn alpha(coverage: f32) -> Self;
-    /// That code, with what is cut off of it.
+    /// That code before its fraction is cut off.
     #[inline(always)]
     fn uncut(coverage: f32) -> f32 {
         coverage.clamp(0.0, 1.0) * Self::STEPS + 0.5
     }
-    /// Whether that is the largest.
+    /// Whether the coverage has the largest code.
     #[inline(always)]
     fn is_solid(coverage: f32) -> bool {
         Self::uncut(coverage) >= Self::STEPS
@@ -78,7 +78,7 @@ impl Sample for u16 {
 /// Develops a whole picture.
 pub(super) fn raster<T: Sample>(picture: &Picture, output: &Output) -> Raster<T> {
     let width = (picture.width as usize).max(1);
-    // Without an end before that of the row: these become lanes.
+    // Without early exit from a row, so that the loop is vectorized.
     let is_opaque = |row: &[[f32; 4]]| row.iter().fold(true, |all, p| all & T::is_solid(p[3]));
     let opaque = output.background.is_some() || picture.beauty.par_chunks(width).all(is_opaque);
     let channels = if opaque { 3 } else { 4 };
@@ -97,7 +97,7 @@ pub(super) fn raster<T: Sample>(picture: &Picture, output: &Output) -> Raster<T>
     Raster { width: picture.width, height: picture.height, channels: if opaque { 3 } else { 4 }, samples }
 }
 
-/// The pixels that a PNG of 8 bits would hold: sRGB codes and straight alpha, rows from the top.
+/// Pixels as an 8-bit PNG would hold them: sRGB codes and straight alpha, rows from the top.
 pub fn rgba8(picture: &Picture, output: &Output) -> Vec<[u8; 4]> {
     let Raster { channels, samples, .. } = raster::<u8>(picture, output);
     if channels == 4 {
@@ -106,11 +106,11 @@ pub fn rgba8(picture: &Picture, output: &Output) -> Vec<[u8; 4]> {
     samples.as_chunks().0.iter().map(|&[r, g, b]| [r, g, b, u8::MAX]).collect()
 }
 
-/// One row on its way to the file.
+/// Kernel that develops one row.
 struct Row<'a, T, const CHANNELS: usize> {
     developer: &'a Developer<'a>,
     row: &'a [[f32; 4]],
-    /// [`Picture::veil`], where there is glass before a background.
+    /// The row of [`Picture::veil`], where there is glass before a background.
     veil: Option<&'a [[f32; 4]]>,
     out: &'a mut [T],
 }
@@ -138,7 +138,7 @@ impl<T: Sample, const CHANNELS: usize> Kernel for Row<'_, T, CHANNELS> {
         }
         let (mut last, mut last_coded) = ([[f32::NAN; 4]; TOGETHER], [[T::default(); TOGETHER]; 4]);
         for (out, pixels) in blocks {
-            // Large parts of a picture are one colour.
+            // Large parts of a picture are one colour: reuse the codes of equal pixels.
             if last[..pixels.len()] != *pixels {
                 last[..pixels.len()].copy_from_slice(pixels);
                 let mut lanes = columns(s, &last);
@@ -150,7 +150,7 @@ impl<T: Sample, const CHANNELS: usize> Kernel for Row<'_, T, CHANNELS> {
     }
 }
 
-/// The channels of so many pixels at most, each in a row.
+/// Transposes at most [`TOGETHER`] pixels into one array per channel.
 #[inline(always)]
 fn columns<S: Simd>(s: S, pixels: &[[f32; 4]]) -> [Channel; 4] {
     let mut columns = [[0.0; TOGETHER]; 4];
@@ -163,21 +163,21 @@ fn columns<S: Simd>(s: S, pixels: &[[f32; 4]]) -> [Channel; 4] {
     columns
 }
 
-/// Codes of display light and, if that is wanted, of coverage.
+/// Codes of display light and, with 4 channels, of coverage.
 #[inline(always)]
 fn coded<T: Sample, const CHANNELS: usize>([r, g, b, coverage]: &[Channel; 4]) -> [[T; TOGETHER]; 4] {
     let alpha = if CHANNELS == 4 { coverage.map(T::alpha) } else { [T::MAX; TOGETHER] };
     [T::codes(r), T::codes(g), T::codes(b), alpha]
 }
 
-/// The steps for one pixel.
+/// The steps of development for one pixel.
 pub(crate) struct Developer<'a> {
     output: &'a Output,
     gain: f32,
 }
 
 impl<'a> Developer<'a> {
-    /// Takes what depends on the settings out of the loop over pixels.
+    /// Hoists what depends on the settings out of the loop over pixels.
     pub(crate) fn new(output: &'a Output) -> Self {
         Self { output, gain: libm::exp2f(output.exposure) }
     }
@@ -189,21 +189,21 @@ impl<'a> Developer<'a> {
         lanes.map(|[c]| c)
     }
 
-    /// [`Self::coded`] before a background that comes through glass, too.
+    /// [`Self::coded`] with the light of the background that comes through glass.
     pub(crate) fn coded_through_glass(&self, pixel: [f32; 4], veil: [f32; 4]) -> [f32; 4] {
         let mut lanes = pixel.map(|c| [c]);
         self.coded_glass(&mut lanes, &veil.map(|c| [c]));
         lanes.map(|[c]| c)
     }
 
-    /// [`Self::coded`] for pixels side by side, each channel in a row of its own.
+    /// [`Self::coded`] for pixels side by side, as one array per channel.
     #[inline(always)]
     pub(crate) fn coded_lanes<const N: usize>(&self, pixels: &mut [[f32; N]; 4]) {
         self.develop(pixels);
         self.code(pixels);
     }
 
-    /// [`Self::coded_lanes`] before a background that comes through glass, too ([`Picture::veil`]).
+    /// [`Self::coded_lanes`] with the light of the background that comes through glass ([`Picture::veil`]).
     #[inline(always)]
     pub(crate) fn coded_glass<const N: usize>(&self, pixels: &mut [[f32; N]; 4], veil: &[[f32; N]; 4]) {
         self.develop_glass(pixels, veil);
@@ -227,7 +227,7 @@ impl<'a> Developer<'a> {
         lanes.map(|[c]| c)
     }
 
-    /// Develops premultiplied linear pixels side by side, each channel in a row of its own.
+    /// Develops premultiplied linear pixels side by side, as one array per channel.
     #[inline(always)]
     fn develop<const N: usize>(&self, pixels: &mut [[f32; N]; 4]) {
         let [r, g, b, coverage] = pixels;
@@ -241,7 +241,7 @@ impl<'a> Developer<'a> {
             (light[0][i], light[1][i], light[2][i]) = (r[i] * scale, g[i] * scale, b[i] * scale);
         }
         self.output.tone_map.map_lanes(&mut light);
-        // No branch in the loops, so that they become lanes.
+        // No branch in the loops, so that they are vectorized.
         let Some(behind) = self.output.background else {
             let covered = *coverage;
             for (channel, light) in [r, g, b].into_iter().zip(&light) {
@@ -256,9 +256,9 @@ impl<'a> Developer<'a> {
         *coverage = [1.0; N];
     }
 
-    /// Develops pixels where glass stands before the background. What is seen of a surface that covers a part of a pixel is
-    /// developed as if it covered all of it, and then taken as often; what glass shows by itself, a lamp in it, covers next to
-    /// nothing and may be brighter than that allows: as far as glass covers the pixel it is developed as it is.
+    /// Develops pixels where glass stands before the background. The light of a surface that covers part of a pixel is developed
+    /// as if it covered all of it, then weighted by coverage. Glass that shows a lamp covers next to nothing, and its own light
+    /// may be brighter than that weight allows: in proportion to the part of glass, the unweighted development is used.
     #[inline(always)]
     fn develop_glass<const N: usize>(&self, pixels: &mut [[f32; N]; 4], veil: &[[f32; N]; 4]) {
         let mut shown = [[0.0; N]; 3];
@@ -303,7 +303,7 @@ mod tests {
     #[test]
     fn opaque_pictures_have_no_alpha_channel() {
         assert_eq!(one([0.5, 0.0, 1.0, 1.0], &plain()), (3, vec![188, 0, 255]));
-        // A sum of sample weights may miss 1 by a rounding.
+        // A sum of sample weights may miss 1 by a rounding error.
         assert_eq!(one([0.5, 0.0, 1.0, 1.0_f32.next_down()], &plain()).0, 3);
     }
 
@@ -354,7 +354,7 @@ mod tests {
     fn glass_takes_its_colour_off_the_background_at_every_exposure_and_shows_lamps() {
         for exposure in [-3.0, 0.0, 3.0] {
             let output = Output { exposure, background: Some([0.5; 3]), ..Output::default() };
-            // Glass of a red that lets 1, 0.2 and 0.2 through, and clear glass with a lamp in it.
+            // Red glass that transmits 1, 0.2 and 0.2, and clear glass with a lamp in it.
             let light = 44.0 * libm::exp2f(-exposure);
             let beauty = vec![[0.0, 0.0, 0.0, 0.8], [light, light, light, 0.08]];
             let veil = vec![[0.4, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]];

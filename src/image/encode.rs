@@ -1,8 +1,8 @@
-//! One door to every format.
+//! Encoding into every format.
 
 use super::{FileKind, ImageError, Metadata, Output, Picture, exr, photo, png};
 
-/// The bytes of a picture file. The same picture, choices and metadata give the same bytes.
+/// Encodes a picture as the bytes of a file. The same picture, choices and metadata give the same bytes.
 pub fn encode(picture: &Picture, kind: FileKind, output: &Output, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
     check_shape(picture)?;
     match kind {
@@ -13,7 +13,7 @@ pub fn encode(picture: &Picture, kind: FileKind, output: &Output, metadata: &Met
     }
 }
 
-/// No format holds a picture without pixels, and every array must have one value a pixel.
+/// Refuses pictures without pixels, which no format holds, and arrays whose length is not one value per pixel.
 fn check_shape(picture: &Picture) -> Result<(), ImageError> {
     let (width, height) = (picture.width, picture.height);
     let pixels = width as usize * height as usize;

@@ -1,4 +1,4 @@
-//! What can go wrong between pixels and files.
+//! Errors of reading and writing pictures.
 
 use super::FileKind;
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// Why a picture could not be encoded or read. One line each; the caller adds the file where none is named.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
-    /// The extension names no picture type we write.
+    /// The extension names no picture type that is written here.
     #[error("{}: picture type {extension} is not known; use {}", path.display(), FileKind::extensions())]
     UnknownKind {
         /// The output path as given.
@@ -23,40 +23,40 @@ pub enum ImageError {
         width: u32,
         /// Rows of the picture.
         height: u32,
-        /// Largest side of the format.
+        /// Largest side that the format holds.
         limit: u32,
     },
-    /// The arrays of the picture do not fit its size.
+    /// An array of the picture does not fit its size.
     #[error("the picture is {width}×{height}, but {array} has {len} values")]
     Shape {
         /// Columns.
         width: u32,
         /// Rows.
         height: u32,
-        /// Which array.
+        /// Name of the array.
         array: &'static str,
         /// Its length.
         len: usize,
     },
-    /// The metadata do not fit the format.
+    /// The metadata does not fit the format.
     #[error("{kind} holds at most {limit} bytes of metadata, there are {len}; use .png or .exr")]
     MetadataTooLong {
         /// The format.
         kind: FileKind,
-        /// Bytes wanted.
+        /// Size of the metadata, in bytes.
         len: usize,
-        /// Bytes allowed.
+        /// Largest size, in bytes.
         limit: usize,
     },
-    /// The encoder refused.
+    /// The encoder failed.
     #[error("could not encode {kind}: {reason}")]
     Encode {
         /// The format.
         kind: FileKind,
-        /// What the encoder said.
+        /// Message of the encoder.
         reason: String,
     },
-    /// The bytes are not a picture of this kind, or a broken one.
+    /// The bytes are not a picture of this kind, or are damaged.
     #[error("not a readable {kind} picture: {reason}")]
     Decode {
         /// The format.
@@ -64,7 +64,7 @@ pub enum ImageError {
         /// What is wrong.
         reason: String,
     },
-    /// The bytes are no picture that can be read here.
+    /// The bytes are not a picture of any kind that is read here.
     #[error("neither a PNG, EXR, JPEG nor a WebP picture")]
     NotAPicture,
     /// The file could not be read.
@@ -72,7 +72,7 @@ pub enum ImageError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The I/O error.
         source: std::io::Error,
     },
 }

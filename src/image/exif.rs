@@ -10,12 +10,12 @@ use std::io::{Read, Seek, SeekFrom};
 const IMAGE_DESCRIPTION: u16 = 0x010e;
 const SOFTWARE: u16 = 0x0131;
 const ASCII: u16 = 2;
-/// `II`: little endian, then the number that says TIFF, then the offset of the directory.
+/// `II`: little endian, then TIFF's magic number, then the offset of the directory.
 const HEADER: [u8; 8] = [b'I', b'I', 42, 0, 8, 0, 0, 0];
 /// Bytes of a directory entry: tag, type, count, value or offset.
 const ENTRY: usize = 12;
 
-/// The TIFF bytes of an EXIF block; empty for empty metadata.
+/// TIFF bytes of an EXIF block; empty for empty metadata.
 pub(super) fn write(metadata: &Metadata) -> Vec<u8> {
     if metadata.is_empty() {
         return Vec::new();
@@ -57,7 +57,7 @@ fn ascii_json(json: &str) -> String {
     ascii
 }
 
-/// Our entries in a TIFF directory, if they are there.
+/// Entries of meshray in a TIFF directory; `None` where there are none.
 pub(super) fn read(tiff: &[u8]) -> Option<Metadata> {
     let u16_at = |at: usize| Some(u16::from_le_bytes(tiff.get(at..at.checked_add(2)?)?.try_into().ok()?));
     let usize_at = |at: usize| {
@@ -78,14 +78,14 @@ pub(super) fn read(tiff: &[u8]) -> Option<Metadata> {
     Metadata::from_json(text)
 }
 
-/// The EXIF block of a JPEG file: its segments are walked up to the pixels.
+/// Finds the EXIF block of a JPEG file: walks its segments up to the pixels.
 pub(super) fn find_in_jpeg(mut file: impl Read + Seek) -> Option<Vec<u8>> {
     file.seek(SeekFrom::Start(2)).ok()?;
     loop {
         let mut head = [0; 4];
         file.read_exact(&mut head).ok()?;
         let [0xff, marker, hi, lo] = head else { return None };
-        // Start of scan: the pixels follow. Below 0xc0 are markers without a length, which do not come this early.
+        // Start of scan: the pixels follow. Markers below 0xc0 have no length, and do not come this early.
         if marker == 0xda || marker < 0xc0 {
             return None;
         }
@@ -98,7 +98,7 @@ pub(super) fn find_in_jpeg(mut file: impl Read + Seek) -> Option<Vec<u8>> {
     }
 }
 
-/// The EXIF block of a WebP file: its chunks are walked without reading the pixels.
+/// Finds the EXIF block of a WebP file: walks its chunks without reading the pixels.
 pub(super) fn find_in_webp(mut file: impl Read + Seek) -> Option<Vec<u8>> {
     file.seek(SeekFrom::Start(12)).ok()?;
     loop {

@@ -10,8 +10,8 @@
 //! | `id.prim id.instance` | uint | prim and instance; 4294967295 where nothing was hit |
 //! | such as `tests.shadow` | uint or float | every other [`Channel`] |
 //!
-//! Layers are name prefixes within one flat part, no name is a bare number, and the beauty has the plain names: that
-//! is what compositing programs and libraries agree on. Equal pictures and metadata give equal bytes.
+//! Layers are name prefixes within one flat part, no name is a bare number, and the beauty has the plain names: the
+//! convention that compositing programs and libraries agree on. Equal pictures and metadata give equal bytes.
 
 mod window;
 
@@ -45,7 +45,7 @@ const ALBEDO: Triple = ["albedo.R", "albedo.G", "albedo.B"];
 const NORMAL: Triple = ["N.X", "N.Y", "N.Z"];
 const POSITION: Triple = ["P.X", "P.Y", "P.Z"];
 
-/// The bytes of an EXR file.
+/// Encodes a picture as the bytes of an EXR file.
 pub(super) fn encode(picture: &Picture, output: &Output, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
     let channels = AnyChannels::sort(channels(picture, output));
     let encoding =
@@ -121,32 +121,32 @@ fn channels(picture: &Picture, output: &Output) -> SmallVec<[AnyChannel<FlatSamp
     list
 }
 
-/// Red, green, blue and alpha of all pixels, each as it is stored.
+/// Red, green, blue and alpha of all pixels as planes, each value converted by `stored`.
 fn beauty<T>(picture: &Picture, background: Option<[f32; 3]>, stored: impl Fn(f32) -> T) -> [Vec<T>; 4] {
     let mut planes = [(); 4].map(|()| Vec::with_capacity(picture.beauty.len()));
     for (at, &pixel) in picture.beauty.iter().enumerate() {
         let pixel = over(pixel, background, picture.veil.get(at));
-        // Noise of few rays around nothing falls below it; programs that read pictures take no light for less than none.
+        // With few rays, noise around zero falls below it; programs that read pictures do not expect negative light.
         planes.iter_mut().zip(pixel).for_each(|(plane, x)| plane.push(stored(if x < 0.0 { 0.0 } else { x })));
     }
     planes
 }
 
-/// The largest number that a half float holds.
+/// Largest finite half float.
 pub const LARGEST_HALF: f32 = 65_504.0;
 
-/// The nearest half; light beyond the largest half becomes that, as infinities spread through every later filter.
+/// Nearest half float; light beyond the largest is clamped to it, as infinities spread through every later filter.
 fn half(x: f32) -> f16 {
     f16::from_f32(if x.is_finite() { x.clamp(-LARGEST_HALF, LARGEST_HALF) } else { x })
 }
 
-/// How many pixels of a picture are brighter than half floats hold.
+/// Number of pixels that are brighter than half floats hold.
 pub fn beyond_half(picture: &Picture) -> usize {
     let is_beyond = |pixel: &&[f32; 4]| pixel.iter().any(|&c| c.is_finite() && c > LARGEST_HALF);
     picture.beauty.iter().filter(is_beyond).count()
 }
 
-/// A premultiplied pixel over a background.
+/// Composites a premultiplied pixel over a background.
 fn over(pixel: [f32; 4], background: Option<[f32; 3]>, veil: Option<&[f32; 4]>) -> [f32; 4] {
     let Some(behind) = background else { return pixel };
     let (through, veil) = (1.0 - pixel[3], veil.copied().unwrap_or_default());
@@ -154,10 +154,10 @@ fn over(pixel: [f32; 4], background: Option<[f32; 3]>, veil: Option<&[f32; 4]>) 
     [r, g, b, 1.0]
 }
 
-/// Puts the header's attributes into the order of their names. The encoder keeps ours in a hash map, whose order
+/// Sorts the header's attributes by name. The encoder keeps ours in a hash map, whose order
 /// changes from run to run; the length stays, so that the offsets of the pixels stay right.
 fn sort_attributes(file: &mut [u8]) -> Option<()> {
-    /// Magic number and version.
+    /// Size of the magic number and the version, in bytes.
     const HEAD: usize = 8;
     let word = |at: usize| file[at..].iter().position(|&b| b == 0).map(|len| at + len + 1);
     let mut attributes = Vec::new();
@@ -175,7 +175,7 @@ fn sort_attributes(file: &mut [u8]) -> Option<()> {
     Some(())
 }
 
-/// Our entries among the attributes of the first part.
+/// Entries of meshray among the attributes of the first part.
 pub(super) fn read_metadata(file: impl BufRead) -> Result<Metadata, ImageError> {
     let meta = MetaData::read_from_buffered(file, false).map_err(|e| ImageError::decode(FileKind::Exr, e))?;
     let mut metadata = Metadata::default();
@@ -191,14 +191,14 @@ pub(super) fn read_metadata(file: impl BufRead) -> Result<Metadata, ImageError> 
     Ok(metadata)
 }
 
-/// Reads the first part of an EXR, at most `max_pixels`: beauty, the layers that have the names of this module, and every other
-/// channel; and says what it holds besides that is not read.
+/// Reads the first part of an EXR, at most `max_pixels`: beauty, the layers named in this module, and every other channel.
+/// Also returns descriptions of what else the file holds and is not read.
 ///
-/// Colours of other primaries become those of Rec. 709. A picture of luminance alone (`Y`) is grey. Its chroma, which
+/// Colours of other primaries are converted to Rec. 709. A picture of luminance alone (`Y`) is grey. Its chroma, which
 /// has fewer values than there are pixels, is left out.
 ///
-/// What is stored of it lies where the file says within the display window; the rest of that is clear, and nothing was hit
-/// there.
+/// The stored pixels are placed in the display window as the file says; the rest of that window is clear, and its layers
+/// say that nothing was hit.
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<(Picture, Vec<String>), ImageError> {
     let fail = |e: ::exr::error::Error| ImageError::decode(FileKind::Exr, e);
     let meta = MetaData::read_from_buffered(bytes, false).map_err(fail)?;
@@ -243,14 +243,14 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<(Picture, Vec<Stri
     Ok((Picture { layers, ..Picture::of(as_u32(width), as_u32(height), beauty) }, left_out))
 }
 
-/// What a file says of its colours; `None` where it says nothing, or that they are those of Rec. 709.
+/// Primaries of a file; `None` where it names none, or those of Rec. 709.
 fn other_primaries(meta: &MetaData) -> Option<Primaries> {
     let said = meta.headers.first()?.shared_attributes.chromaticities?;
     let primaries = Primaries::of([said.red, said.green, said.blue, said.white].map(|at| [at.x(), at.y()]));
     (!primaries.are_near(&Primaries::REC_709)).then_some(primaries)
 }
 
-/// Turns the colour of a pixel, which is weighed by its coverage in any space.
+/// Transforms the colour of a pixel; premultiplication commutes with that.
 #[expect(clippy::cast_possible_truncation, reason = "colours are stored so")]
 fn turn(turned: DMat3, pixel: &mut [f32; 4]) {
     let [r, g, b, _] = pixel.map(f64::from);
@@ -258,10 +258,10 @@ fn turn(turned: DMat3, pixel: &mut [f32; 4]) {
     [pixel[0], pixel[1], pixel[2]] = color.to_array().map(|c| c as f32);
 }
 
-/// The channels of a part, found by name.
+/// The channels of a part, by name.
 struct Channels<'a> {
     list: &'a [AnyChannel<FlatSamples>],
-    /// Pixels that are stored.
+    /// Number of stored pixels.
     len: usize,
     window: Window,
 }
@@ -269,16 +269,16 @@ struct Channels<'a> {
 impl Channels<'_> {
     fn find(&self, name: &str) -> Option<&FlatSamples> {
         let named = |c: &&AnyChannel<FlatSamples>| c.name.as_slice() == name.as_bytes();
-        // Subsampled channels have fewer values and are passed over.
+        // Subsampled channels have fewer values and are skipped.
         self.list.iter().find(named).map(|c| &c.sample_data).filter(|s| s.len() == self.len)
     }
 
-    /// The values that are shown, 0 where none are stored.
+    /// Values of a channel in the display window, 0 where none are stored.
     fn floats(&self, name: &str) -> Option<Vec<f32>> {
         self.floats_or(name, 0.0)
     }
 
-    /// The values that are shown, `outside` where none are stored.
+    /// Values of a channel in the display window, `outside` where none are stored.
     fn floats_or(&self, name: &str, outside: f32) -> Option<Vec<f32>> {
         self.find(name).map(|samples| self.window.shown(samples.values_as_f32().collect(), outside))
     }
@@ -290,7 +290,7 @@ impl Channels<'_> {
         }
     }
 
-    /// The names of the three colours: those there are, or luminance for each.
+    /// Names of the three colour channels: those of R, G and B that exist, or luminance for all three.
     fn colors(&self) -> Option<Triple> {
         let colors = ["R", "G", "B"];
         let is_there = |name: &&str| self.find(name).is_some();
@@ -323,7 +323,7 @@ impl Channels<'_> {
         self.colors().into_iter().chain(triples).flatten().chain(["A", "Z"]).chain(ids).collect()
     }
 
-    /// Channels that have no array of their own.
+    /// Channels that have no array of their own in [`Layers`].
     fn others(&self) -> Vec<Channel> {
         let taken = self.taken();
         let other = |channel: &AnyChannel<FlatSamples>| {
@@ -340,7 +340,7 @@ impl Channels<'_> {
         self.list.iter().filter_map(other).collect()
     }
 
-    /// What is said of channels with fewer values than there are pixels.
+    /// Descriptions of the channels with fewer values than there are pixels.
     fn too_short(&self) -> Vec<String> {
         let short = self.list.iter().filter(|channel| channel.sample_data.len() != self.len);
         short.map(|channel| format!("channel {}, which is subsampled", channel.name)).collect()
@@ -458,7 +458,7 @@ mod tests {
         assert_eq!(decode(&bytes, 1).unwrap().0.beauty, vec![[2.5, 0.25, 0.25, 1.0]]);
     }
 
-    /// An EXR of another program with these channels, two by two pixels, a part for each list.
+    /// Builds a foreign EXR with the given channels, two by two pixels, a part for each list.
     fn foreign(parts: &[&[(&str, FlatSamples)]]) -> Vec<u8> {
         foreign_in(None, parts)
     }

@@ -21,7 +21,7 @@ impl FileKind {
     /// Every kind.
     pub const ALL: [Self; 4] = [Self::Png, Self::Exr, Self::Jpeg, Self::Webp];
 
-    /// The kind a path's extension names; upper and lower case are the same.
+    /// Kind named by a path's extension, in upper or lower case.
     pub fn from_path(path: &Path) -> Result<Self, ImageError> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         let known = extension.as_deref().and_then(Self::from_extension);
@@ -31,7 +31,7 @@ impl FileKind {
         })
     }
 
-    /// The kind of a lower-case extension without its dot.
+    /// Kind of a lower-case extension without its dot.
     pub fn from_extension(extension: &str) -> Option<Self> {
         match extension {
             "png" => Some(Self::Png),
@@ -52,10 +52,10 @@ impl FileKind {
         }
     }
 
-    /// Whether it can hold so many columns and rows.
+    /// Checks that the format can hold a picture of this size.
     ///
     /// # Errors
-    /// With the largest side that its size fields hold.
+    /// [`ImageError::TooLarge`] with the largest side that the format's size fields hold.
     pub fn fits(self, width: u32, height: u32) -> Result<(), ImageError> {
         let limit = match self {
             Self::Png | Self::Exr => return Ok(()),
@@ -68,12 +68,12 @@ impl FileKind {
         Ok(())
     }
 
-    /// Whether transparency survives.
+    /// Whether the format keeps transparency.
     pub fn has_alpha(self) -> bool {
         self != Self::Jpeg
     }
 
-    /// Every extension understood, for messages.
+    /// Every known extension, for messages.
     pub fn extensions() -> &'static str {
         ".png, .exr, .jpg, .jpeg or .webp"
     }

@@ -1,4 +1,4 @@
-//! What a picture says about its making: key/value texts under stable names, written into every format and read back.
+//! Metadata of a picture: how it was made, as key/value texts under stable names, written into every format and read back.
 //!
 //! | format | where |
 //! |---|---|
@@ -6,7 +6,7 @@
 //! | EXR | one string attribute for each entry |
 //! | JPEG, WebP | EXIF `ImageDescription`: one JSON object of all entries |
 //!
-//! All of them also carry the program's name in the format's own place for it (`Software`, `software`).
+//! All of them also carry the program's name in the format's own field for it (`Software`, `software`).
 //! Files are not trusted: only the head of a file is parsed, and no text longer than [`MAX_TEXT`] is taken.
 
 use super::{FileKind, ImageError, exif, exr, png};
@@ -18,10 +18,10 @@ use std::path::Path;
 /// Longest text taken from a file, in bytes.
 pub const MAX_TEXT: usize = 1 << 20;
 
-/// Longest key: as PNG has it.
+/// Longest key, in bytes: the limit of PNG.
 const LONGEST_KEY: usize = 79;
 
-/// What every key begins with; other entries of a file are ignored.
+/// Prefix of every key; other entries of a file are ignored.
 pub const PREFIX: &str = "meshray:";
 
 /// Key/value texts of a picture.
@@ -31,7 +31,7 @@ pub struct Metadata {
 }
 
 impl Metadata {
-    /// Version of the program that wrote the picture; its presence says that meshray wrote it.
+    /// Version of the program that wrote the picture; its presence marks a picture of meshray.
     pub const VERSION: &'static str = "meshray:version";
     /// Every setting that decides the pixels, as a JSON object: what `--again` repeats.
     pub const SETTINGS: &'static str = "meshray:settings";
@@ -39,26 +39,26 @@ impl Metadata {
     pub const INPUT: &'static str = "meshray:input";
     /// Hash of the bytes of every file read, in hexadecimal.
     pub const INPUT_HASH: &'static str = "meshray:input-hash";
-    /// What it was made of, by which `--update` knows whether it is up to date, as a JSON object: hashes of what was asked
-    /// and of each file, in hexadecimal.
+    /// What the picture was made of, as a JSON object: hashes of the request and of each file, in hexadecimal. `--update`
+    /// compares them to find out whether the picture is up to date.
     pub const MADE_OF: &'static str = "meshray:made-of";
     /// Counts of a counted run, as a JSON object.
     pub const COUNTS: &'static str = "meshray:counts";
 
-    /// This program's version and nothing else. ([`Metadata::default`] is empty and writes nothing.)
+    /// Metadata with this program's version and nothing else. ([`Metadata::default`] is empty and writes nothing.)
     pub fn new() -> Self {
         Self::default().with(Self::VERSION, env!("CARGO_PKG_VERSION"))
     }
 
-    /// Adds or replaces an entry. `key` begins with [`PREFIX`] and is at most 79 letters of printable ASCII; one that is not is
-    /// no entry, and changes nothing.
+    /// Adds or replaces an entry. `key` begins with [`PREFIX`] and is at most 79 characters of printable ASCII; any other key is
+    /// ignored.
     #[must_use]
     pub fn with(mut self, key: &'static str, value: impl Into<String>) -> Self {
         self.insert(key, &value.into());
         self
     }
 
-    /// The value of a key.
+    /// Value of a key.
     pub fn get(&self, key: &str) -> Option<&str> {
         self.entries.get(key).map(String::as_str)
     }
@@ -68,7 +68,7 @@ impl Metadata {
         self.entries.iter().map(|(key, value)| (key.as_str(), value.as_str()))
     }
 
-    /// Whether there is nothing to write.
+    /// Whether there are no entries.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
@@ -78,7 +78,7 @@ impl Metadata {
         format!("meshray {}", self.get(Self::VERSION).unwrap_or(env!("CARGO_PKG_VERSION")))
     }
 
-    /// Takes an entry if its key is ours. No format can hold a zero byte.
+    /// Inserts an entry if its key is one of meshray. Zero bytes in the value are replaced, as no format can hold them.
     pub(super) fn insert(&mut self, key: &str, value: &str) {
         let is_printable = key.bytes().all(|byte| byte.is_ascii_graphic() || byte == b' ');
         if key.starts_with(PREFIX) && key.len() <= LONGEST_KEY && is_printable {
@@ -98,7 +98,7 @@ impl Metadata {
     }
 }
 
-/// Reads the metadata of a picture file; `None` when it is no picture, or one without ours.
+/// Reads the metadata of a picture file; `None` when it is not a picture, or has no metadata of meshray.
 pub fn read_metadata(path: &Path) -> Result<Option<Metadata>, ImageError> {
     let read = |source| ImageError::Read { path: path.to_owned(), source };
     let mut file = BufReader::new(File::open(path).map_err(read)?);
@@ -120,13 +120,13 @@ fn read_from(magic: &[u8], file: impl BufRead + Seek) -> Result<Option<Metadata>
     Ok((!found.is_empty()).then_some(found))
 }
 
-/// Whether a file is a picture that meshray wrote: the only files that a default output name may replace.
+/// Whether a file is a picture that meshray wrote: only such files may be replaced by a default output name.
 pub fn was_written_by_meshray(path: &Path) -> bool {
-    // To open a pipe would wait for who writes into it.
+    // Opening a pipe would wait for its writer.
     path.is_file() && matches!(read_metadata(path), Ok(Some(metadata)) if metadata.get(Metadata::VERSION).is_some())
 }
 
-/// The picture type that a file's first bytes show.
+/// Picture type by a file's magic bytes.
 pub(super) fn kind_of(magic: &[u8]) -> Option<FileKind> {
     if magic.starts_with(b"\x89PNG\r\n\x1a\n") {
         Some(FileKind::Png)
@@ -210,11 +210,11 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let pipe = dir.path().join("pipe.png");
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-        // To open it would wait for ever.
+        // Opening it would wait for ever.
         assert!(!was_written_by_meshray(&pipe));
     }
 
-    /// Cuts the file at every length and spoils every byte of its head: any answer is right but a panic.
+    /// Truncates the file at every length and corrupts every byte of its head: any result but a panic is right.
     #[test]
     fn broken_files_end_in_an_answer() {
         let try_to_read = |bytes: &[u8]| drop(read_from(bytes, std::io::Cursor::new(bytes)));

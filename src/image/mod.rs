@@ -1,7 +1,7 @@
 //! Linear pixels <-> files: tone mapping, PNG, EXR with layers, JPEG, WebP, metadata, difference metrics.
 //!
-//! [`encode`] turns a [`Picture`] into the bytes of a file, [`rgba8`] into what is shown on a screen, [`write_atomic`] puts
-//! them on the disk, [`read_metadata`] tells how a picture was made. Knows nothing of scenes or rays.
+//! [`encode`] turns a [`Picture`] into the bytes of a file, [`rgba8`] into pixels for a screen, [`write_atomic`] writes a file
+//! to the disk, [`read_metadata`] reads how a picture was made. Knows nothing of scenes or rays.
 
 mod develop;
 pub mod diff;
@@ -42,23 +42,22 @@ pub struct Picture {
     pub height: u32,
     /// Beauty: RGBA, colour premultiplied by alpha; `width × height` values.
     pub beauty: Vec<[f32; 4]>,
-    /// What else was asked for (`--layers`).
+    /// Further per-pixel data that was requested (`--layers`).
     pub layers: Option<Layers>,
-    /// Light of a known background that comes through glass beyond what alpha leaves of it, by its colour: laid behind like the
-    /// background, neither exposed nor tone mapped;
-    /// and which part of what covers the pixel is glass. Empty, or `width × height` values where glass stands before a
-    /// background.
+    /// RGB: light of a known background that comes through coloured glass, in excess of what alpha lets through; added like the
+    /// background, neither exposed nor tone mapped. A: the part of the pixel's coverage that is glass. Empty, or
+    /// `width × height` values where glass stands before a background.
     pub veil: Vec<[f32; 4]>,
 }
 
 impl Picture {
-    /// The beauty alone.
+    /// Picture of beauty alone.
     pub fn of(width: u32, height: u32, beauty: Vec<[f32; 4]>) -> Self {
         Self { width, height, beauty, layers: None, veil: Vec::new() }
     }
 }
 
-/// Per-pixel facts beside the beauty; each array is empty or `width × height` long.
+/// Per-pixel data beside the beauty; each array is empty or `width × height` long.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Layers {
     /// Surface colour without light, linear, averaged over the samples.
@@ -73,16 +72,16 @@ pub struct Layers {
     pub prim: Vec<u32>,
     /// Instance id of that sample (spheres, cones and planes count on after the instances); `u32::MAX` where nothing was hit.
     pub instance: Vec<u32>,
-    /// Whatever else was asked for.
+    /// Further channels that were requested.
     pub channels: Vec<Channel>,
 }
 
-/// One more value for each pixel.
+/// One more value per pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// Such as `tests.shadow`: what is before the point is the layer.
+    /// Name such as `tests.shadow`: the layer is the part before the dot.
     pub name: String,
-    /// `width × height` of them.
+    /// `width × height` values.
     pub values: Values,
 }
 
@@ -96,7 +95,7 @@ pub enum Values {
 }
 
 impl Values {
-    /// How many there are.
+    /// Number of values.
     pub fn len(&self) -> usize {
         match self {
             Self::U32(values) => values.len(),
@@ -104,12 +103,12 @@ impl Values {
         }
     }
 
-    /// Whether there are none.
+    /// Whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Each of them; both kinds fit exactly.
+    /// Every value; both kinds convert to `f64` exactly.
     pub fn iter(&self) -> impl Iterator<Item = f64> {
         let (counts, measures): (&[u32], &[f32]) = match self {
             Self::U32(values) => (values, &[]),

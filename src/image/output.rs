@@ -1,22 +1,22 @@
-//! How linear pixels become a file: the choices a user has.
+//! User choices of how linear pixels become a file.
 
 use super::ToneMap;
 
 /// Choices for [`super::encode`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
-    /// Curve from scene light to display light; EXR files stay linear and never see it.
+    /// Curve from scene light to display light; EXR files stay linear and ignore it.
     pub tone_map: ToneMap,
-    /// Stops of brightening (doublings) before the tone map; EXR files never see it.
+    /// Stops of brightening (doublings) before the tone map; EXR files ignore it.
     pub exposure: f32,
     /// Linear Rec. 709 colour behind the picture, each channel 0..=1; `None` keeps the transparency.
     ///
-    /// For display formats it is laid behind the tone-mapped picture, so that white stays white; for EXR it is laid
-    /// behind the linear one. JPEG has no transparency and takes white for `None`.
+    /// For display formats it is composited behind the tone-mapped picture, so that white stays white; for EXR behind the
+    /// linear one. JPEG has no transparency and takes white for `None`.
     pub background: Option<[f32; 3]>,
     /// Bits of a PNG sample.
     pub png_depth: PngDepth,
-    /// Numbers in an EXR's colour channels.
+    /// Number type of an EXR's colour channels.
     pub exr_samples: ExrSamples,
     /// JPEG quality, 1..=100.
     pub jpeg_quality: u8,
@@ -45,7 +45,7 @@ pub enum PngDepth {
     Sixteen,
 }
 
-/// Numbers in an EXR's colour channels; positions and depth are always floats, ids always unsigned integers.
+/// Number type of an EXR's colour channels; positions and depth are always floats, ids always unsigned integers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ExrSamples {
     /// 16 bit, 11 of precision, up to 65 504.

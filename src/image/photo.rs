@@ -9,10 +9,10 @@ use ::image::metadata::Orientation;
 use ::image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageFormat, ImageReader};
 use std::io::Cursor;
 
-/// Room for EXIF in a JPEG's APP1 segment: 65 535 bytes less the length field and the six letters before it.
+/// Room for EXIF in a JPEG's APP1 segment: 65 535 bytes less the length field and the six-byte identifier.
 const JPEG_EXIF: usize = 65_535 - 2 - 6;
 
-/// The bytes of a JPEG file; transparent pictures are laid on white when no background is given.
+/// Encodes a JPEG file; transparent pictures are composited over white when no background is given.
 pub(super) fn encode_jpeg(picture: &Picture, output: &Output, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
     FileKind::Jpeg.fits(picture.width, picture.height)?;
     let exif = exif::write(metadata);
@@ -26,7 +26,7 @@ pub(super) fn encode_jpeg(picture: &Picture, output: &Output, metadata: &Metadat
     Ok(file)
 }
 
-/// The bytes of a lossless WebP file.
+/// Encodes a lossless WebP file.
 pub(super) fn encode_webp(picture: &Picture, output: &Output, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
     FileKind::Webp.fits(picture.width, picture.height)?;
     let mut file = Vec::new();
@@ -35,8 +35,8 @@ pub(super) fn encode_webp(picture: &Picture, output: &Output, metadata: &Metadat
     Ok(file)
 }
 
-/// Reads such a file as it is looked at; at most `max_pixels`. A JPEG that was cut off is refused: what is missing would be shown
-/// as something.
+/// Reads a JPEG or WebP file, upright; at most `max_pixels`. A truncated JPEG is refused, as the decoder would invent the
+/// missing part.
 pub(super) fn decode(bytes: &[u8], kind: FileKind, max_pixels: u64) -> Result<Picture, ImageError> {
     if kind == FileKind::Jpeg && jpeg::is_cut_off(bytes) {
         let reason = format!("its {} bytes have no end; it was cut off", bytes.len());
@@ -44,7 +44,7 @@ pub(super) fn decode(bytes: &[u8], kind: FileKind, max_pixels: u64) -> Result<Pi
     }
     let fail = |e: ::image::ImageError| ImageError::decode(kind, e);
     let format = if kind == FileKind::Webp { ImageFormat::WebP } else { ImageFormat::Jpeg };
-    // Four bytes a pixel; sizes are compared with `max_pixels` before any is read.
+    // Four bytes a pixel; the size is compared with `max_pixels` before any pixel is read.
     let mut limits = ::image::Limits::no_limits();
     limits.max_alloc = Some(max_pixels.saturating_mul(4));
     let reader = || {
@@ -55,7 +55,7 @@ pub(super) fn decode(bytes: &[u8], kind: FileKind, max_pixels: u64) -> Result<Pi
     let (width, height) = reader().into_dimensions().map_err(fail)?;
     super::read::check_size(kind, width, height, max_pixels)?;
     let mut decoder = reader().into_decoder().map_err(fail)?;
-    // Cameras note how they were held.
+    // Cameras record how they were held.
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let mut upright = DynamicImage::from_decoder(decoder).map_err(fail)?;
     upright.apply_orientation(orientation);

@@ -6,7 +6,7 @@ use super::{FileKind, ImageError, Metadata, Output, Picture, PngDepth, srgb};
 use ::png::{BitDepth, ColorType, Compression, Decoder, Encoder, Filter, SrgbRenderingIntent, Transformations};
 use std::io::{BufRead, Cursor, Seek};
 
-/// The bytes of a PNG file.
+/// Encodes a PNG file.
 pub(super) fn encode(picture: &Picture, output: &Output, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
     match output.png_depth {
         PngDepth::Eight => {
@@ -22,7 +22,7 @@ pub(super) fn encode(picture: &Picture, output: &Output, metadata: &Metadata) ->
     .map_err(|e| ImageError::encode(FileKind::Png, e))
 }
 
-/// The bytes of a PNG file of samples that are coded already.
+/// Encodes a PNG file of 8-bit samples that are already coded.
 pub(super) fn write_bytes(raster: &Raster<u8>, metadata: &Metadata) -> Result<Vec<u8>, ::png::EncodingError> {
     write(raster, &raster.samples, BitDepth::Eight, metadata)
 }
@@ -54,7 +54,7 @@ fn write<T>(
     Ok(file)
 }
 
-/// Our entries among the texts before the pixels.
+/// Entries of meshray among the texts before the pixels.
 pub(super) fn read_metadata(file: impl BufRead + Seek) -> Result<Metadata, ImageError> {
     let decode = |e: ::png::DecodingError| ImageError::decode(FileKind::Png, e);
     let reader = Decoder::new(file).read_info().map_err(decode)?;

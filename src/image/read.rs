@@ -4,17 +4,17 @@ use super::metadata::kind_of;
 use super::{FileKind, ImageError, Picture, exr, photo, png};
 use std::path::Path;
 
-/// Pixels that [`read_picture`] takes at most.
+/// Largest number of pixels that [`read_picture`] takes.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
-/// A picture file as it was read.
+/// A decoded picture file.
 #[derive(Clone, Debug)]
 pub struct PictureFile {
     /// Premultiplied linear pixels, and the layers of an EXR.
     pub picture: Picture,
-    /// What kind of file it is.
+    /// Kind of the file.
     pub kind: FileKind,
-    /// What the file holds besides, in words: parts and channels of an EXR that are not read.
+    /// Contents that were not read, in words: parts and channels of an EXR.
     pub left_out: Vec<String>,
 }
 
@@ -23,14 +23,14 @@ pub fn read_picture(path: &Path) -> Result<Picture, ImageError> {
     read_picture_file(path).map(|file| file.picture)
 }
 
-/// Reads a picture, and tells what kind of file it is and what of it was not read.
+/// Reads a picture file, with its kind and descriptions of what was not read.
 pub fn read_picture_file(path: &Path) -> Result<PictureFile, ImageError> {
     let bytes = std::fs::read(path).map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
     decode_file(&bytes, MAX_PIXELS)
 }
 
-/// Reads the bytes of a picture file, the kind found by content; more than `max_pixels` are refused before memory is
-/// taken for them.
+/// Decodes the bytes of a picture file, its kind found by content; more than `max_pixels` are refused before memory is
+/// allocated for them.
 pub fn decode(bytes: &[u8], max_pixels: u64) -> Result<Picture, ImageError> {
     decode_file(bytes, max_pixels).map(|file| file.picture)
 }

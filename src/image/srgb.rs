@@ -1,8 +1,8 @@
 //! The sRGB transfer function (IEC 61966-2-1:1999) between linear light and coded values, rounded correctly.
 //!
-//! Exact codes go by thresholds: code `c` begins at the linear value whose exact code is `c - 1/2`. They are found once
-//! with `libm`, so the same linear value has the same code on every machine. Most 8-bit codes need none: a polynomial is exact
-//! enough to be sure of them, and thresholds decide the others.
+//! Exact codes go by thresholds: code `c` begins at the linear value whose exact code is `c - 1/2`. The thresholds are computed
+//! once with `libm`, so the same linear value has the same code on every machine. Most 8-bit codes need none: a polynomial
+//! is accurate enough to be sure of them, and thresholds decide the others.
 
 use crate::math::formula::WHOLE;
 use std::sync::LazyLock;
@@ -28,7 +28,7 @@ pub fn decode16(code: u16) -> f32 {
     narrow(decode(f64::from(code) / 65_535.0))
 }
 
-/// The 8-bit code nearest to linear light; below 0 and NaN are 0, above 1 is 255.
+/// Nearest 8-bit code of linear light; below 0 and NaN give 0, above 1 gives 255.
 pub fn encode8(linear: f32) -> u8 {
     #[expect(clippy::cast_possible_truncation, reason = "the table was built for codes up to 255")]
     {
@@ -36,13 +36,13 @@ pub fn encode8(linear: f32) -> u8 {
     }
 }
 
-/// The table of 8-bit codes.
+/// Table of the 8-bit codes.
 fn codes8() -> &'static Codes {
     static CODES: LazyLock<Codes> = LazyLock::new(|| Codes::new(255, 16));
     &CODES
 }
 
-/// The table of 16-bit codes.
+/// Table of the 16-bit codes.
 pub(super) fn codes16() -> &'static Codes {
     static CODES: LazyLock<Codes> = LazyLock::new(|| Codes::new(65_535, 12));
     &CODES
@@ -53,22 +53,22 @@ fn narrow(x: f64) -> f32 {
     x as f32
 }
 
-/// Where each code begins, and a way to get near without a search.
+/// Lower bound of each code, and buckets that find the code almost without a search.
 pub(super) struct Codes {
     /// `begin[c]` is the smallest linear value of code `c`; `begin[0]` is minus infinity, one past the last is infinity.
     begin: Vec<f32>,
-    /// The linear values that share their leading bits, from `lowest` to 1.
+    /// Buckets of linear values that share their leading bits, from `lowest` to 1.
     buckets: Vec<Bucket>,
     /// First value of the first bucket; its code is 0.
     lowest: f32,
-    /// Bits below a bucket's leading ones.
+    /// Number of bits below a bucket's leading ones.
     shift: u32,
 }
 
 struct Bucket {
-    /// Code of its first value.
+    /// Code of the bucket's first value.
     code: u16,
-    /// Where the next code begins.
+    /// Linear value at which the next code begins.
     next: f32,
 }
 
@@ -88,14 +88,14 @@ impl Codes {
         Self { begin, buckets, lowest: f32::from_bits(low << shift), shift }
     }
 
-    /// The code nearest to linear light.
+    /// Nearest code of linear light.
     #[inline]
     pub(super) fn code(&self, linear: f32) -> u16 {
         // Comparisons that NaN fails, each one instruction.
         let linear = if linear > self.lowest { linear } else { self.lowest };
         let linear = if linear < 1.0 { linear } else { 1.0 };
         let bucket = &self.buckets[((linear.to_bits() - self.lowest.to_bits()) >> self.shift) as usize];
-        // Mostly the one or the other. An addition does what a branch would have to guess.
+        // Mostly one of two codes. An addition avoids a branch that would be mispredicted.
         let mut code = bucket.code + u16::from(linear >= bucket.next);
         while linear >= self.begin[usize::from(code) + 1] {
             code += 1;
@@ -104,19 +104,19 @@ impl Codes {
     }
 }
 
-/// The smallest `f32` that is not below `x`.
+/// Smallest `f32` that is not below `x`.
 fn round_up(x: f64) -> f32 {
     let near = narrow(x);
     if f64::from(near) < x { near.next_up() } else { near }
 }
 
-/// The coded value 0..=1 of linear light, which is held in 0..=1, within 6·10⁻⁷ of it; 0 of NaN. Of a few roots and products,
-/// which compilers make lanes of, with the same bits everywhere.
+/// Coded value 0..=1 of linear light, which is clamped to 0..=1, within 6·10⁻⁷; 0 for NaN. Made of a few roots and products,
+/// which compilers vectorize, with the same bits everywhere.
 #[inline(always)]
 pub(super) fn curve(linear: f32) -> f32 {
-    /// Below this the curve is straight.
+    /// Linear light below which the curve is straight.
     const STRAIGHT: f32 = 0.003_130_8;
-    /// Of the fourth root: the polynomial whose greatest error above that is least, found by E. Y. Remez' exchange (1934).
+    /// Minimax polynomial in the fourth root for the rest of the curve, found by E. Y. Remez' exchange (1934).
     const OF_ROOT: [f32; 8] = [
         -0.058_446_59,
         0.123_575_87,
@@ -136,16 +136,16 @@ pub(super) fn curve(linear: f32) -> f32 {
     if light > STRAIGHT { curved } else { 12.92 * light }
 }
 
-/// The 8-bit codes nearest to linear light, as [`encode8`] finds them, side by side.
+/// Nearest 8-bit codes of linear light, as [`encode8`] finds them, side by side.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "the lowest bits are the code")]
 pub(super) fn encode8_lanes<const N: usize>(linear: &[f32; N]) -> [u8; N] {
-    /// What the curve may be off by, in codes, and the rounding of a product: 255 · (6·10⁻⁷ + 2⁻²³), and some room.
+    /// Error bound of the curve and of the product's rounding, in codes: 255 · (6·10⁻⁷ + 2⁻²³), and some margin.
     const OFF: f32 = 3e-4;
     let mut codes = [0; N];
     let mut unsure = 0;
     for i in 0..N {
-        // The nearest code without a cast, of which compilers make no lanes.
+        // Nearest code without a cast, which compilers do not vectorize.
         let code = 255.0 * curve(linear[i]);
         let rounded = code + WHOLE;
         unsure |= u32::from((code - (rounded - WHOLE)).abs() > 0.5 - OFF);
@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn codes_are_the_formula_rounded() {
-        // Steps that are prime to the tables' buckets, over all floats from 2^-30 to just over 1.
+        // Stride prime to the tables' buckets, over all floats from 2^-30 to just over 1.
         for bits in (0x3080_0000..0x3f80_0010_u32).step_by(2_503) {
             let linear = f32::from_bits(bits);
             let exact = encode(f64::from(linear)).clamp(0.0, 1.0);

@@ -1,9 +1,9 @@
-//! What a developed picture looks like, and what it is like: is it too dark, blown out, empty?
+//! Statistics of a developed picture (too dark, blown out, empty?), and the developed picture itself.
 
 use super::develop::Developer;
 use super::{Output, Picture, ToneMap, srgb, tone};
 
-/// What a developed picture is like where it is covered: is it too dark, blown out, empty?
+/// Statistics of a developed picture where it is covered: is it too dark, blown out, empty?
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Look {
     /// Fraction of pixels with any coverage.
@@ -12,11 +12,11 @@ pub struct Look {
     pub mean_luminance: f64,
     /// Fraction of the covered pixels with a channel at its largest 8-bit code.
     pub clipped: f64,
-    /// Pixels with a value that is no number.
+    /// Number of pixels with a NaN.
     pub not_numbers: u64,
 }
 
-/// Looks at a picture through the tone map and exposure of `output`, without its background.
+/// Computes the statistics of a picture through the tone map and exposure of `output`, without its background.
 pub fn look(picture: &Picture, output: &Output) -> Look {
     let output = Output { background: None, ..output.clone() };
     let developer = Developer::new(&output);
@@ -42,13 +42,13 @@ pub fn look(picture: &Picture, output: &Output) -> Look {
     }
 }
 
-/// The choices that show a picture's values as they are.
+/// Choices that show a picture's values unchanged.
 pub fn as_is() -> Output {
     Output { tone_map: ToneMap::None, ..Output::default() }
 }
 
-/// A picture as light of the display, through the tone map and exposure of `output`: premultiplied, 0..=1, and what comes through
-/// glass of a known background added.
+/// Develops a picture into display light, through the tone map and exposure of `output`: premultiplied, 0..=1, plus the light of
+/// a known background that comes through glass.
 pub fn developed(picture: &Picture, output: &Output) -> Picture {
     let output = Output { background: None, ..output.clone() };
     let developer = Developer::new(&output);

@@ -1,6 +1,6 @@
 //! Tone mapping: scene light (0 to infinity) to display light (0 to 1), both linear Rec. 709.
 //!
-//! Curves: *PBR Neutral* (Khronos Group, 2024), which keeps base colours as they are up to 0.8 and fades highlights to
+//! Curves: *PBR Neutral* (Khronos Group, 2024), which preserves base colours up to 0.8 and fades highlights to
 //! white; *Reinhard* on luminance (Reinhard, Stark, Shirley, Ferwerda, "Photographic Tone Reproduction for Digital
 //! Images", 2002); *ACES* as fitted by Stephen Hill (2016) to the reference rendering and Rec. 709 output transforms.
 
@@ -9,18 +9,18 @@ use crate::named::names;
 /// Curve from scene light to display light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ToneMap {
-    /// Clipped at 1.
+    /// Clamped to 1.
     None,
     /// Luminance L becomes L / (1 + L).
     Reinhard,
     /// Filmic: more contrast, coloured highlights turn white.
     Aces,
-    /// Colours true up to 0.8, soft highlights.
+    /// Colours preserved up to 0.8, soft highlights.
     #[default]
     Neutral,
 }
 
-/// Largest light that is told apart; keeps infinities out of the curves, where they would turn into NaN.
+/// Largest light before the curves; keeps infinities out of them, where they would turn into NaN.
 const BRIGHTEST: f32 = 1e12;
 
 /// Luminance weights of linear Rec. 709.
@@ -36,8 +36,8 @@ impl ToneMap {
         lanes.map(|[c]| c)
     }
 
-    /// Maps several colours at once, each channel in a row of its own: no lane takes a branch, so that the compiler makes vectors
-    /// of them, and each comes out as it would alone.
+    /// Maps several colours at once, as one array per channel: without branches, so that the compiler vectorizes the loops, and
+    /// each colour comes out as it would alone.
     #[inline(always)]
     pub(super) fn map_lanes<const N: usize>(self, color: &mut [[f32; N]; 3]) {
         hold(color, BRIGHTEST);
@@ -51,7 +51,7 @@ impl ToneMap {
     }
 }
 
-/// Holds all numbers in 0..=most.
+/// Clamps all channels to 0..=`most`.
 #[inline(always)]
 fn hold<const N: usize>(color: &mut [[f32; N]; 3], most: f32) {
     for channel in color {
@@ -61,7 +61,7 @@ fn hold<const N: usize>(color: &mut [[f32; N]; 3], most: f32) {
     }
 }
 
-/// `x` held in 0..=most; NaN becomes 0. Written so that each comparison is one instruction.
+/// Clamps `x` to 0..=`most`; NaN becomes 0. Written so that each comparison is one instruction.
 #[inline(always)]
 fn within(x: f32, most: f32) -> f32 {
     let x = if x > 0.0 { x } else { 0.0 };
@@ -115,10 +115,10 @@ fn aces<const N: usize>(color: &mut [[f32; N]; 3]) {
 
 #[inline(always)]
 fn neutral<const N: usize>(color: &mut [[f32; N]; 3]) {
-    /// Reflectance of a dielectric at normal incidence: the curve takes this much off, so that a base colour lit fully
-    /// comes out as itself.
+    /// Reflectance of a dielectric at normal incidence: subtracted by the curve, so that a fully lit base colour comes out
+    /// unchanged.
     const F90_OFFSET: f32 = 0.04;
-    /// Below this everything is kept, above it compressed.
+    /// Peak below which colours are kept, above which they are compressed.
     const START: f32 = 0.8 - F90_OFFSET;
     /// How fast compressed colours fade to white.
     const DESATURATION: f32 = 0.15;
@@ -130,7 +130,7 @@ fn neutral<const N: usize>(color: &mut [[f32; N]; 3]) {
         let offset = if darkest < 2.0 * F90_OFFSET { part } else { F90_OFFSET };
         let (x, y, z) = (r[i] - offset, g[i] - offset, b[i] - offset);
         let peak = greater(greater(x, y), z);
-        // Below the start these are thrown away.
+        // Discarded for peaks below the start.
         let new_peak = 1.0 - ROOM * ROOM / (peak + ROOM - START);
         let white = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
         let (scale, rest) = (new_peak / peak, new_peak * white);
@@ -157,7 +157,7 @@ mod tests {
     #[test]
     fn neutral_keeps_a_lit_base_colour_but_for_the_dielectric_sheen() {
         assert!(close(ToneMap::Neutral.map([0.5, 0.3, 0.2]), [0.46, 0.26, 0.16], 1e-6));
-        // With one black channel nothing is taken off.
+        // With one black channel nothing is subtracted.
         assert!(close(ToneMap::Neutral.map([0.5, 0.0, 0.2]), [0.5, 0.0, 0.2], 1e-6));
     }
 

@@ -1,17 +1,17 @@
-//! Writing a file so that nobody ever finds half of one under its name.
+//! Writes a file atomically: nobody ever finds half of one under its name.
 
 use std::fs::{self, Permissions};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes `bytes` to a temporary file in the same folder and renames it to `path`. On failure nothing is left.
+/// Writes `bytes` to a temporary file in the same folder and renames it to `path`. A failure leaves nothing behind.
 ///
-/// A file that is replaced keeps its permissions, a new one gets the usual ones; a link stays, and the file it points
-/// to is replaced or made. What is no regular file (a device, a pipe) is written straight, and what the process has open
-/// already (`/dev/stdout`, `/dev/fd/3`) where it was left.
+/// A replaced file keeps its permissions, a new one gets the usual ones; a symbolic link stays, and its target
+/// is replaced or created. Devices and pipes are written directly; a file that the process has open already
+/// (`/dev/stdout`, `/dev/fd/3`) is continued where it was left.
 ///
 /// # Errors
-/// What the system says, with the remedy where the folder is missing, `path` is a folder, or the file is read-only.
+/// I/O errors, with the remedy where the folder is missing, `path` is a folder, or the file is read-only.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
     if let Some(number) = descriptor(path) {
         return write_on(number, path, bytes);
@@ -35,12 +35,12 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_and_rename(&target, &folder, old, bytes)
 }
 
-/// Whether [`write_atomic`] can make its file in the folder of `path`: one is made and goes at once. Where what is there
-/// already is written straight, none is needed.
+/// Whether [`write_atomic`] can create its file in the folder of `path`: tries one and removes it at once. True where `path`
+/// is written directly, without such a file.
 pub fn folder_takes(path: &Path) -> bool {
     let target = destination(path);
     let is_written_straight = descriptor(path).is_some() || fs::metadata(&target).is_ok_and(|old| !old.is_file());
-    // Permissions do not say it all: some file systems take no files from anybody. Where it can be, the file has no name.
+    // Permissions do not suffice: some file systems accept no files from anybody. Where possible the trial file has no name.
     is_written_straight || tempfile::tempfile_in(folder_of(&target)).is_ok()
 }
 
@@ -50,10 +50,10 @@ fn write_and_rename(target: &Path, folder: &Path, old: Option<Permissions>, byte
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        // What creating a file asks for; the umask takes its part. Temporary files are private otherwise.
+        // The default mode of new files, less the umask. Temporary files would be private.
         builder.permissions(Permissions::from_mode(0o666));
     }
-    // Its own message would name the temporary file.
+    // The error's own message would name the temporary file.
     let unmade =
         |e: io::Error| fault(e.kind(), &format!("no file can be made in folder {}: {}", folder.display(), e.kind()));
     let mut file = builder.tempfile_in(folder).map_err(unmade)?;
@@ -65,16 +65,16 @@ fn write_and_rename(target: &Path, folder: &Path, old: Option<Permissions>, byte
     Ok(())
 }
 
-/// Links that lead to links, at most; those of a circle lead nowhere.
+/// Largest number of symbolic links to follow; a cycle of them leads nowhere.
 const LINKS: usize = 40;
 
-/// The number under which the process has open what a path leads to, where that is how it is named.
+/// File descriptor that a path names, where it leads to one under which the process has a file open.
 fn descriptor(path: &Path) -> Option<u32> {
     let mut target = path.to_owned();
     for _ in 0..LINKS {
         let number = target.file_name().and_then(|name| name.to_str()?.parse().ok());
         let next = fs::read_link(&target).ok();
-        // Most paths are none, and the system need not be asked more.
+        // Most paths are neither a number nor a link, and need no further system call.
         if number.is_none() && next.is_none() {
             return None;
         }
@@ -87,7 +87,7 @@ fn descriptor(path: &Path) -> Option<u32> {
     None
 }
 
-/// Writes behind what was written there before.
+/// Appends to an open file.
 fn write_on(number: u32, path: &Path, bytes: &[u8]) -> io::Result<()> {
     let all = |out: &mut dyn Write| out.write_all(bytes).and_then(|()| out.flush());
     match number {
@@ -97,8 +97,8 @@ fn write_on(number: u32, path: &Path, bytes: &[u8]) -> io::Result<()> {
     }
 }
 
-/// Where a path leads through symbolic links, also where there is no file there yet; what the process has open already
-/// stays as it is named.
+/// Resolves symbolic links, also where the target does not exist yet; a path to a file that the process has open already
+/// is returned unchanged.
 pub fn destination(path: &Path) -> PathBuf {
     if descriptor(path).is_some() {
         return path.to_owned();
@@ -114,7 +114,7 @@ pub fn destination(path: &Path) -> PathBuf {
     target
 }
 
-/// The folder a path lies in; that of a bare file name is the current one.
+/// Folder of a path; the current one for a bare file name.
 fn folder_of(path: &Path) -> PathBuf {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
@@ -209,7 +209,7 @@ mod tests {
             let picture = dir.path().join("a.png");
             assert!(folder_takes(&picture) && folder_takes(Path::new("/dev/null")));
             fs::set_permissions(dir.path(), Permissions::from_mode(0o555)).unwrap();
-            // Some users may all the same.
+            // Some users may write there all the same.
             let takes = write_atomic(&picture, b"x").map_err(|e| e.to_string());
             assert_eq!(folder_takes(&picture), takes.is_ok());
             assert_eq!(names(dir.path()).len(), usize::from(takes.is_ok()), "nothing is left of asking");

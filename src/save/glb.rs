@@ -5,18 +5,18 @@ use serde_json::{Map, Value, json};
 use crate::math::{DAffine3, Vec3};
 use crate::scene::{Instance, Material, Mesh, Reflection, Scene, UpAxis};
 
-/// Component types and buffer targets of the format.
+/// Component types and buffer targets of glTF.
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
 const VERTICES: u32 = 34962;
 const INDICES: u32 = 34963;
 
-/// The scene does not fit into the format.
+/// Error: the scene does not fit into the format.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0} bytes are more than a .glb can hold (4294967295); write .obj, or ask for less")]
 pub struct TooLarge(usize);
 
-/// The bytes of a .glb: triangles, instances, colours, and smooth glass; textures, lights, cameras, and
+/// Bytes of a .glb: triangles, instances, colours, and smooth glass; textures, lights, cameras, and
 /// shapes other than triangles are left out.
 ///
 /// # Errors
@@ -108,7 +108,7 @@ fn material(material: &Material) -> Value {
     value
 }
 
-/// Header, JSON chunk, binary chunk, each padded to four bytes.
+/// Assembles the header, the JSON chunk and the binary chunk, each padded to four bytes.
 fn container(mut json: Vec<u8>, mut bin: Vec<u8>) -> Result<Vec<u8>, TooLarge> {
     json.resize(json.len().next_multiple_of(4), b' ');
     bin.resize(bin.len().next_multiple_of(4), 0);

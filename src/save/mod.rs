@@ -1,6 +1,6 @@
-//! Scene -> file: what the program generates, in formats that every other program reads.
+//! Scene -> file: generated scenes, in formats that every other program reads.
 //!
-//! Both writers put +Y up, as their formats say.
+//! Both writers turn +Y up, as their formats require.
 
 pub mod glb;
 pub mod obj;

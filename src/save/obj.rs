@@ -5,11 +5,11 @@ use std::io::{self, Write};
 
 use crate::scene::{Scene, UpAxis};
 
-/// Writes the triangles of a scene, instances turned into geometry; coordinates as the shortest decimals that give the
-/// same `f32` again.
+/// Writes the triangles of a scene, instances flattened into geometry; coordinates as the shortest decimals that round-trip
+/// to the same `f32`.
 ///
 /// # Errors
-/// Those of `out`.
+/// I/O errors of `out`.
 pub fn write(scene: &Scene, out: &mut impl Write) -> io::Result<()> {
     let turn = scene.up.turned_to(UpAxis::Y);
     let mut before = 1;
@@ -21,7 +21,7 @@ pub fn write(scene: &Scene, out: &mut impl Write) -> io::Result<()> {
             let p = world.transform_point3(p.as_dvec3()).as_vec3();
             writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
         }
-        // Where a mirror has turned faces round, they are wound the other way.
+        // A mirroring transform flips the faces, so their winding is reversed.
         let is_mirrored = world.matrix3.determinant() < 0.0;
         for [a, b, c] in mesh.triangles.iter().map(|t| t.map(|i| i as usize + before)) {
             let [b, c] = if is_mirrored { [c, b] } else { [b, c] };
@@ -32,7 +32,7 @@ pub fn write(scene: &Scene, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// A name on one line.
+/// Name without control characters, on one line.
 fn name(name: &str) -> String {
     if name.is_empty() { "object".into() } else { name.replace(char::is_control, " ") }
 }

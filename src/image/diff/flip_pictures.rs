@@ -1,4 +1,4 @@
-//! FLIP of whole pictures, transparent ones among them.
+//! FLIP of whole pictures, also transparent ones.
 
 use super::flip::range::{Exposures, flip_of_any_range};
 use super::flip::{Displayed, flip};
@@ -6,31 +6,31 @@ use super::{Space, place};
 use crate::image::Picture;
 use std::ops::RangeInclusive;
 
-/// How pictures can be looked at, pixels a degree. At the finest what an eye sees at once is as many pixels, and filters of
-/// that size take minutes; at the coarsest a pixel is larger than all that is seen.
+/// Viewing conditions allowed, in pixels per degree. At the upper end the visual field spans as many pixels, and filters of
+/// that size take minutes; at the lower end a pixel is larger than the visual field.
 pub const PIXELS_PER_DEGREES: RangeInclusive<f64> = 0.01..=1000.0;
 
-/// How different two pictures look.
+/// Result of FLIP: how different two pictures look.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Looks {
     /// FLIP of each pixel, 0..=1.
     pub values: Vec<f32>,
-    /// Its mean.
+    /// Mean of the values.
     pub mean: f64,
-    /// The greatest.
+    /// Largest value.
     pub max: f64,
-    /// Column and row of the first pixel with that.
+    /// Column and row of the first pixel with the largest value.
     pub worst: (u32, u32),
-    /// Exposures that linear pictures were looked at with.
+    /// Exposures used for linear pictures.
     pub exposures: Option<Exposures>,
 }
 
-/// Looks at two pictures at so many pixels a degree, of [`PIXELS_PER_DEGREES`]; `None` when their sizes
-/// differ, or pixels are missing, or for any other number.
+/// Computes FLIP of two pictures at `pixels_per_degree`, one of [`PIXELS_PER_DEGREES`]; `None` when their sizes
+/// differ, pixels are missing, or `pixels_per_degree` lies outside that range.
 ///
-/// Displayed pictures with transparent parts are looked at on black and on white, and the worse of both counts for each
-/// pixel. Linear pictures are looked at on black, at every exposure that suits them. What is no number is black to its
-/// neighbours; where one picture alone has such a pixel they differ by 1 there, where both have one by nothing.
+/// Displayed pictures with transparent parts are compared on black and on white, and the worse of both counts for each
+/// pixel. Linear pictures are compared on black, at every exposure that suits them. NaNs are black to their
+/// neighbours; a pixel with a NaN in just one picture differs by 1, in both pictures by 0.
 pub fn looks(expected: &Picture, actual: &Picture, space: Space, pixels_per_degree: f64) -> Option<Looks> {
     let can_be_seen = PIXELS_PER_DEGREES.contains(&pixels_per_degree);
     if !(can_be_seen && super::are_alike(expected, actual)) {
@@ -75,12 +75,12 @@ pub fn looks(expected: &Picture, actual: &Picture, space: Space, pixels_per_degr
     Some(Looks { mean, max, worst: place(worst, expected.width), values, exposures })
 }
 
-/// Linear pixels over black. What is no number is black.
+/// Linear pixels over black, NaN as black.
 fn light(picture: &Picture) -> Vec<[f32; 3]> {
     picture.beauty.iter().map(|&[r, g, b, _]| [r, g, b].map(|c| if c.is_nan() { 0.0 } else { c })).collect()
 }
 
-/// Premultiplied pixels over a grey, as light of the display. What is no number is black.
+/// Premultiplied pixels over a grey, as display light, NaN as black.
 fn displayed(picture: &Picture, back: f32) -> Vec<[f32; 3]> {
     let shown = |c: f32| if c > 0.0 { c.min(1.0) } else { 0.0 };
     let over = |&[r, g, b, a]: &[f32; 4]| [r, g, b].map(|c| shown(c + back * (1.0 - a)));

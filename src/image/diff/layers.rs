@@ -1,4 +1,4 @@
-//! How different the layers of two EXR files are.
+//! Differences of the layers of two EXR files.
 
 use super::distance;
 use crate::image::Layers;
@@ -6,22 +6,22 @@ use crate::image::Layers;
 /// The difference of one layer that both pictures have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerDifference {
-    /// As in the file, such as `albedo`, `Z` or `id.prim`.
+    /// Name as in the file, such as `albedo`, `Z` or `id.prim`.
     pub name: String,
-    /// Root of the mean squared difference of its values, of those that both have: a depth where something is seen, say. Of
-    /// numbers that are names, as `id.prim`'s are, those that differ count 1.
+    /// Root mean squared difference, over the pairs of values that are not finite in just one picture (a depth of a surface that
+    /// only one shows is left out). Ids, such as `id.prim`, that differ count 1.
     pub rmse: f64,
-    /// The greatest difference; infinite where just one of two values is finite.
+    /// Largest difference; infinite where just one of two values is finite.
     pub max: f64,
-    /// Values that differ.
+    /// Number of values that differ.
     pub differing: u64,
-    /// Of them those of which one is finite and the other is not.
+    /// Number of those where one value is finite and the other is not.
     pub of_one: u64,
-    /// Values compared.
+    /// Number of values compared.
     pub values: u64,
 }
 
-/// Those of the layers that both have, and the names of those that one has alone.
+/// Differences of the layers that both have, and the names of the layers that only one has.
 pub fn layer_differences(expected: &Layers, actual: &Layers) -> (Vec<LayerDifference>, Vec<String>) {
     let (ours, theirs) = (named(expected), named(actual));
     let other = |name: &str| theirs.iter().find(|(other, _)| other == name);
@@ -56,13 +56,13 @@ fn difference(name: &str, expected: &[f64], actual: &[f64]) -> LayerDifference {
 }
 
 impl LayerDifference {
-    /// Whether the numbers of a layer are names: two are the same one or not, and how far apart they are means nothing.
+    /// Whether the numbers of a layer are ids: they are equal or not, and their distance means nothing.
     pub fn is_name(layer: &str) -> bool {
         layer.starts_with("id.")
     }
 }
 
-/// Every layer there is, by its name in the file.
+/// Every non-empty layer, with its name in the file.
 fn named(layers: &Layers) -> Vec<(String, Vec<f64>)> {
     let vectors = |name: &str, values: &[[f32; 3]]| {
         (name.to_owned(), values.as_flattened().iter().copied().map(f64::from).collect())

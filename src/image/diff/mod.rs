@@ -1,8 +1,8 @@
-//! How different two pictures are: numbers, and pictures of the difference.
+//! Differences of two pictures: numbers, and pictures of the difference.
 //!
 //! Differences are those of the display codes (sRGB, 0..=1), where equal steps look about equal, or of the linear
-//! values. Sums run over rows in order, so that they do not depend on threads. How different pictures look to an eye
-//! says [`flip`](mod@flip).
+//! values. Sums run over rows in order, so that they do not depend on threads. [`flip`](mod@flip) computes how different
+//! the pictures look to an eye.
 
 pub mod flip;
 mod flip_pictures;
@@ -13,32 +13,32 @@ pub use layers::{LayerDifference, layer_differences};
 
 use super::{Picture, srgb};
 
-/// What is compared.
+/// Values that are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Space {
-    /// Premultiplied linear values as they are.
+    /// Premultiplied linear values, unchanged.
     Linear,
     /// sRGB codes 0..=1 of the colour over black, and coverage. Linear pixels get neither exposure nor tone map: a picture that
     /// was rendered is compared with another one, not with its own PNG.
     Display,
 }
 
-/// How different two pictures of one size are, over all pixels; over three channels, or four where a pixel of either is
-/// not covered in full.
+/// Difference of two pictures of one size, over all pixels; over three channels, or four where a pixel of either is
+/// not fully covered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
     /// Channels compared: 3 or 4.
     pub channels: u32,
-    /// Root of the mean squared difference.
+    /// Root mean squared difference.
     pub rmse: f64,
-    /// Root of the mean squared error, relative to the root of the mean square of what was expected, of which values that are no
-    /// finite numbers count as 0; infinite where that is black.
+    /// Root mean squared error, relative to the root mean square of the expected values, where values that are not finite
+    /// count as 0; infinite where the expected picture is black.
     pub relative_rmse: f64,
-    /// Mean of what is there less what was expected, over the colour channels: what no noise explains.
+    /// Mean of actual less expected values, over the colour channels: error that noise does not explain.
     pub bias: f64,
     /// Largest difference of a channel; infinite where just one of two values is a number.
     pub max: f64,
-    /// Column and row of the first pixel with that.
+    /// Column and row of the first pixel with the largest difference.
     pub worst: (u32, u32),
     /// Peak signal-to-noise ratio for a peak of 1, decibels; infinite for equal pictures.
     pub psnr: f64,
@@ -86,13 +86,13 @@ pub fn compare(expected: &Picture, actual: &Picture, space: Space, threshold: f6
     })
 }
 
-/// Largest difference of a channel, at each pixel of two pictures; `None` when their sizes differ, or pixels are missing.
+/// Largest difference of a channel, for each pixel of two pictures; `None` when their sizes differ, or pixels are missing.
 pub fn greatest(expected: &Picture, actual: &Picture, space: Space) -> Option<Vec<f64>> {
     let pixels = are_alike(expected, actual).then(|| expected.beauty.iter().zip(&actual.beauty))?;
     Some(pixels.map(|(&a, &b)| channel_differences(a, b, space).into_iter().fold(0.0, f64::max)).collect())
 }
 
-/// Whether two pictures have one size, and all their pixels.
+/// Whether two pictures have the same size and no missing pixels.
 fn are_alike(expected: &Picture, actual: &Picture) -> bool {
     let size = |picture: &Picture| (picture.width, picture.height);
     let is_whole = |picture: &Picture| picture.beauty.len() == picture.width as usize * picture.height as usize;
@@ -123,18 +123,18 @@ fn distance(a: f64, b: f64) -> f64 {
     }
 }
 
-/// The values of a pixel that are compared.
+/// Values of a pixel that are compared.
 pub fn values(pixel: [f32; 4], space: Space) -> [f64; 4] {
     let (values, steps) = in_steps(pixel, space);
     values.map(|value| value / steps)
 }
 
-/// The values of a pixel that are compared, and of how many steps 1 is made. Codes of 8 and of 16 bits are whole numbers of
-/// steps: equal differences of theirs are equal numbers, though they were light in between.
+/// Values of a pixel that are compared, and the number of steps that 1 is divided into. 8-bit and 16-bit codes are whole numbers
+/// of steps, so that equal differences of codes are equal numbers even after a detour through light.
 fn in_steps([r, g, b, a]: [f32; 4], space: Space) -> ([f64; 4], f64) {
-    /// Of the codes of 16 bits.
+    /// Steps from 0 to 1: those of 16-bit codes.
     const STEPS: f64 = 65535.0;
-    /// More than light in single precision makes of a code, in steps.
+    /// Bound on the error of a code after single-precision light, in steps.
     const ROUNDING: f64 = 0.01;
     let stepped = |code: f64| {
         let (steps, whole) = (code * STEPS, (code * STEPS).round());
@@ -147,8 +147,8 @@ fn in_steps([r, g, b, a]: [f32; 4], space: Space) -> ([f64; 4], f64) {
     }
 }
 
-/// Expected, difference, actual, side by side; the difference is that of the display codes, `gain` times, on black.
-/// Where sizes differ, what is missing is clear.
+/// Places expected, difference and actual side by side; the difference is that of the display codes, times `gain`, on black.
+/// Where sizes differ, missing pixels are clear.
 pub fn side_by_side(expected: &Picture, actual: &Picture, gain: f32) -> Picture {
     let (width, height) = (expected.width.max(actual.width), expected.height.max(actual.height));
     let mut beauty = Vec::with_capacity(width as usize * height as usize * 3);
@@ -171,7 +171,7 @@ fn pixel(picture: &Picture, x: u32, y: u32) -> [f32; 4] {
 #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
 fn difference_color(a: [f32; 4], b: [f32; 4], gain: f32) -> [f32; 4] {
     let [r, g, blue, coverage] = channel_differences(a, b, Space::Display).map(|d| d as f32 * gain);
-    // Where only the coverage differs, grey shows it.
+    // Where only the coverage differs, it shows as grey.
     let [r, g, b] = [r, g, blue].map(|c| srgb::decode(f64::from(c.max(coverage).min(1.0))) as f32);
     [r, g, b, 1.0]
 }

@@ -1,12 +1,12 @@
-//! Letters of five by nine pixels, drawn for this program: what scales and legends are written with.
+//! Bitmap letters of five by nine pixels, drawn for this program: the font of scales and legends.
 
 /// Columns of a letter.
 pub(super) const WIDTH: u32 = 5;
-/// Rows of a letter: two above the small letters, two below the line.
+/// Rows of a letter: two above the small letters, two below the baseline.
 pub(super) const HEIGHT: u32 = 9;
 
-/// The rows of a letter from the top, a bit for each pixel, the left one highest; capitals look like small letters, and
-/// what there is no letter for is a box.
+/// Rows of a letter from the top, a bit per pixel, the leftmost highest; capitals look like small letters, and
+/// unknown characters are a box.
 pub(super) fn rows(letter: char) -> [u8; HEIGHT as usize] {
     const BOX: [u8; HEIGHT as usize] = [0b11111, 0b10001, 0b10001, 0b10001, 0b10001, 0b10001, 0b11111, 0, 0];
     let letter = letter.to_ascii_lowercase();

@@ -1,9 +1,9 @@
-//! Heat maps: how much of something there is in each pixel, as a colour.
+//! Heat maps: a quantity per pixel, as a colour.
 
 use super::{Canvas, Color, text_height, text_width};
 
-/// Dark blue to yellow, its lightness even: J. Nuñez, C. Anderton, R. Renslow, "Optimizing colormaps with consideration
-/// for color vision deficiency" (cividis, 2018), at six places.
+/// Colour map from dark blue to yellow of even lightness: J. Nuñez, C. Anderton, R. Renslow, "Optimizing colormaps with
+/// consideration for color vision deficiency" (cividis, 2018), at six places.
 pub const COLORS: [Color; 6] =
     [[0, 32, 77], [49, 68, 107], [102, 105, 112], [149, 143, 120], [203, 186, 105], [255, 234, 70]];
 
@@ -15,36 +15,36 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Up to `max`; counts of one `unit` are told apart from 0.
+    /// Scale up to `max`; values from about `unit` on are told apart from 0.
     pub fn new(max: f64, unit: f64) -> Self {
         Self { max: max.max(unit), unit }
     }
 
-    /// The largest value told apart from others.
+    /// Upper end of the scale.
     pub fn max(&self) -> f64 {
         self.max
     }
 
-    /// The place of a value, 0 to 255.
+    /// Position of a value on the scale, 0 to 255.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
     pub fn place(&self, value: f64) -> u8 {
         let part = libm::log1p(value / self.unit) / libm::log1p(self.max / self.unit);
         (part * 255.0).round().clamp(0.0, 255.0) as u8
     }
 
-    /// The colour of a value.
+    /// Colour of a value.
     pub fn color(&self, value: f64) -> Color {
         color(self.place(value))
     }
 
-    /// Values to write beside the scale: 0, powers of ten well apart from the end, and the end.
+    /// Values to label beside the scale: 0, powers of ten well apart from the end, and the end.
     pub fn ticks(&self) -> Vec<f64> {
         let decades = (0..18).map(|decade| self.unit * 10f64.powi(decade)).take_while(|&tick| tick < 0.4 * self.max);
         std::iter::once(0.0).chain(decades).chain([self.max]).collect()
     }
 }
 
-/// The colour of a place on the scale: between the two nearest of [`COLORS`].
+/// Colour of a position on the scale, interpolated between the two nearest of [`COLORS`].
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two bytes")]
 pub fn color(place: u8) -> Color {
     let along = f64::from(place) / 255.0 * (COLORS.len() - 1) as f64;
@@ -54,18 +54,18 @@ pub fn color(place: u8) -> Color {
     [0, 1, 2].map(|k| (f64::from(a[k]) * (1.0 - part) + f64::from(b[k]) * part).round() as u8)
 }
 
-/// What a heat map shows.
+/// Description of a heat map.
 #[derive(Clone, Copy, Debug)]
 pub struct Map<'a> {
     /// Columns of the picture.
     pub width: u32,
-    /// Row by row.
+    /// Values, row by row.
     pub values: &'a [f64],
-    /// Their colours.
+    /// Scale that colours the values.
     pub scale: Scale,
-    /// What is written above the scale.
+    /// Text above the scale.
     pub title: &'a str,
-    /// Writes a value beside the scale.
+    /// Formats a value beside the scale.
     pub label: fn(f64) -> String,
 }
 
@@ -73,7 +73,7 @@ const PAPER: Color = [255; 3];
 const INK: Color = [34; 3];
 
 impl Map<'_> {
-    /// The map, and below it its title and its scale.
+    /// Draws the map, and below it its title and its scale.
     pub fn draw(&self) -> Canvas {
         let height = u32::try_from(self.values.len() / self.width.max(1) as usize).unwrap_or(0);
         let dot = (self.width / 480).clamp(1, 6);

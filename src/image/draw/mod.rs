@@ -15,32 +15,32 @@ pub type Color = [u8; 3];
 pub struct Canvas {
     width: u32,
     height: u32,
-    /// Rows from the top.
+    /// Pixels, rows from the top.
     pixels: Vec<Color>,
 }
 
 impl Canvas {
-    /// Pixels of one colour.
+    /// Canvas of one colour.
     pub fn filled(width: u32, height: u32, color: Color) -> Self {
         Self { width, height, pixels: vec![color; width as usize * height as usize] }
     }
 
-    /// Columns.
+    /// Number of columns.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Rows.
+    /// Number of rows.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// A pixel; `None` beyond the edge.
+    /// Colour of a pixel; `None` beyond the edge.
     pub fn pixel(&self, x: u32, y: u32) -> Option<Color> {
         (x < self.width).then(|| self.pixels.get(y as usize * self.width as usize + x as usize).copied()).flatten()
     }
 
-    /// Colours a pixel; nothing happens beyond the edge.
+    /// Sets a pixel; does nothing beyond the edge.
     pub fn set(&mut self, x: u32, y: u32, color: Color) {
         if x < self.width
             && let Some(pixel) = self.pixels.get_mut(y as usize * self.width as usize + x as usize)
@@ -71,7 +71,7 @@ impl Canvas {
         }
     }
 
-    /// A picture as it looks when it is displayed; transparent parts show `behind`, linear.
+    /// Canvas of a picture as it is displayed; transparent parts show `behind`, linear.
     pub fn of(picture: &Picture, behind: [f32; 3]) -> Self {
         let output = Output { background: Some(behind), ..Output::default() };
         let raster: Raster<u8> = raster(picture, &output);
@@ -79,7 +79,7 @@ impl Canvas {
         Self { width: picture.width, height: picture.height, pixels }
     }
 
-    /// Mixes every pixel with a colour, of which `part` (0 to 1) is taken.
+    /// Blends every pixel with a colour of opacity `part` (0 to 1).
     pub fn wash(&mut self, color: Color, part: f32) {
         self.pixels.iter_mut().for_each(|pixel| *pixel = mix(*pixel, color, part));
     }
@@ -91,8 +91,8 @@ impl Canvas {
         }
     }
 
-    /// Draws a straight line between two points (pixel centres are at halves), `width` pixels wide, smooth at its sides;
-    /// `part` of its colour is taken. Points may lie anywhere.
+    /// Draws a straight line between two points (pixel centres are at halves), `width` pixels wide, its sides antialiased, with
+    /// opacity `part`. Points may lie anywhere.
     pub fn line(&mut self, from: DVec2, to: DVec2, width: f64, color: Color, part: f32) {
         let Some((from, to)) = self.clipped(from, to, width) else { return };
         let way = to - from;
@@ -104,7 +104,7 @@ impl Canvas {
             std::mem::swap(&mut a, &mut b);
         }
         let slope = if b.x > a.x { (b.y - a.y) / (b.x - a.x) } else { 0.0 };
-        // How far apart the sides are along the minor axis.
+        // Distance of the sides from the middle along the minor axis.
         let cosine = if length > 0.0 { ((b.x - a.x) / length).max(0.5) } else { 1.0 };
         let reach = (width / 2.0 + 0.5) / cosine;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clipped to the canvas")]
@@ -139,7 +139,7 @@ impl Canvas {
         }
     }
 
-    /// The part of a line that can be seen (W. Cyrus, J. Beck, 1978, for a rectangle).
+    /// Visible part of a line (W. Cyrus, J. Beck, 1978, for a rectangle).
     fn clipped(&self, from: DVec2, to: DVec2, width: f64) -> Option<(DVec2, DVec2)> {
         let way = to - from;
         let size = DVec2::new(f64::from(self.width), f64::from(self.height));
@@ -159,7 +159,7 @@ impl Canvas {
         (near <= far && from.is_finite() && to.is_finite()).then(|| (from + way * near, from + way * far))
     }
 
-    /// The bytes of a PNG file.
+    /// Encodes the canvas as a PNG file.
     pub fn png(&self, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
         let samples = self.pixels.as_flattened().to_vec();
         let raster = Raster { width: self.width, height: self.height, channels: 3, samples };
@@ -167,19 +167,19 @@ impl Canvas {
     }
 }
 
-/// Between two colours.
+/// Interpolates between two colours, the second of weight `part`.
 fn mix(a: Color, b: Color, part: f32) -> Color {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two bytes")]
     [0, 1, 2].map(|k| (f32::from(a[k]) * (1.0 - part) + f32::from(b[k]) * part).round() as u8)
 }
 
-/// Columns that a line of text takes.
+/// Width of a line of text, in pixels.
 pub fn text_width(text: &str, scale: u32) -> u32 {
     let letters = u32::try_from(text.chars().count()).unwrap_or(u32::MAX / 64);
     (letters * (glyphs::WIDTH + 1)).saturating_sub(1) * scale
 }
 
-/// Rows that a line of text takes.
+/// Height of a line of text, in pixels.
 pub const fn text_height(scale: u32) -> u32 {
     glyphs::HEIGHT * scale
 }

@@ -1,15 +1,15 @@
-//! Where the stored pixels of an EXR lie in the picture that it shows.
+//! Placement of an EXR's stored pixels (data window) in the picture that it shows (display window).
 
 use ::exr::meta::attribute::IntegerBounds;
 use ::exr::prelude::Vec2;
 
-/// Which of the pixels that are stored a picture shows, and where.
+/// Placement of the stored pixels in the picture.
 pub(super) struct Window {
     /// Columns and rows of the picture.
     pub size: Vec2<usize>,
-    /// Columns and rows that are stored.
+    /// Columns and rows of the stored pixels.
     stored: Vec2<usize>,
-    /// The first of them, from the first of the picture.
+    /// First stored column and row, relative to the first of the picture.
     first: Vec2<i64>,
 }
 
@@ -20,14 +20,14 @@ impl Window {
         Self { size: display.size, stored, first }
     }
 
-    /// Whether any that is stored is not shown.
+    /// Whether some stored pixels lie outside of the picture.
     pub(super) fn is_cropped(&self) -> bool {
         let is_within = |first: i64, stored: usize, size: usize| first >= 0 && stored as i64 <= size as i64 - first;
         let Self { size, stored, first } = self;
         !(is_within(first.0, stored.0, size.0) && is_within(first.1, stored.1, size.1))
     }
 
-    /// What the picture has of such values, and `outside` where none is stored.
+    /// Places stored values in the picture, with `outside` where none are stored.
     pub(super) fn shown<T: Copy>(&self, values: Vec<T>, outside: T) -> Vec<T> {
         if (self.size, self.first) == (self.stored, Vec2(0, 0)) {
             return values;

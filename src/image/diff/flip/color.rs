@@ -1,4 +1,4 @@
-//! Colours as the eye sees them from a distance, and how far apart they look.
+//! Colours as the eye sees them from a distance, and their perceived differences.
 
 use super::Displayed;
 use super::filter::{Along, bell, filtered};
@@ -12,30 +12,30 @@ const XYZ: [[f64; 3]; 3] = [
     [1_425_312.0 / 73_733_382.0, 8_788_810.0 / 73_733_382.0, 70_074_185.0 / 73_733_382.0],
 ];
 
-/// The inverse of that.
+/// Inverse of [`XYZ`].
 const RGB: [[f64; 3]; 3] = [
     [3.241_003_275, -1.537_398_934, -0.498_615_861],
     [-0.969_224_334, 1.875_930_071, 0.041_554_224],
     [0.055_639_423, -0.204_011_202, 1.057_148_933],
 ];
 
-/// What the sensitivity of the eye to a contrast is made of, for luminance, red against green, and blue against yellow: two
-/// bells, each a weight and a width (table 1 of the paper).
+/// Contrast sensitivity of the eye for luminance, red against green, and blue against yellow: two Gaussians each, as weight
+/// and width (table 1 of the paper).
 const SENSITIVITY: [[(f64, f64); 2]; 3] =
     [[(1.0, 0.0047), (0.0, 1e-5)], [(1.0, 0.0053), (0.0, 1e-5)], [(34.1, 0.04), (13.5, 0.025)]];
 
-/// Differences are raised to this power.
+/// Exponent that colour differences are raised to.
 const POWER: f32 = 0.7;
-/// Up to this part of the greatest difference…
+/// Knee of the error mapping, as a fraction of the largest difference.
 const KNEE: f32 = 0.4;
-/// … values run to this.
+/// Value of the error mapping at the knee.
 const AT_KNEE: f32 = 0.95;
 
-/// A colour of CIE L*a*b*, its chroma weakened where it is dark (R. W. G. Hunt, "Light and dark adaptation and the
+/// Colour of CIE L*a*b*, its chroma reduced where it is dark (R. W. G. Hunt, "Light and dark adaptation and the
 /// perception of color", 1952).
 pub(super) type Seen = [f32; 3];
 
-/// What is seen of each pixel.
+/// Perceived colour of each pixel.
 pub(super) fn seen(picture: Displayed, pixels_per_degree: f64) -> Vec<Seen> {
     let (taps, [first, second]) = taps(pixels_per_degree);
     let opponent: Vec<[f32; 4]> = picture.pixels.par_iter().map(|&p| opponent(p)).collect();
@@ -44,26 +44,27 @@ pub(super) fn seen(picture: Displayed, pixels_per_degree: f64) -> Vec<Seen> {
     blurred.into_par_iter().map(|[y, cx, a, b]| hunt(lab(displayed([y, cx, first * a + second * b])))).collect()
 }
 
-/// The difference of two colours, 0..=1; `most` is [`most`].
+/// Difference of two colours, 0..=1; `most` is [`most`].
 pub(super) fn difference(a: Seen, b: Seen, most: f32) -> f32 {
     let d = libm::powf(distance(a, b), POWER);
     let knee = KNEE * most;
     if d < knee { AT_KNEE / knee * d } else { AT_KNEE + (d - knee) / (most - knee) * (1.0 - AT_KNEE) }
 }
 
-/// The greatest difference of two colours that can be displayed, those of pure green and blue.
+/// Largest difference of two colours that can be displayed, pure green and pure blue.
 pub(super) fn most() -> f32 {
     libm::powf(distance(hunt(lab([0.0, 1.0, 0.0])), hunt(lab([0.0, 0.0, 1.0]))), POWER)
 }
 
-/// S. Abasi, M. A. Tehran, M. D. Fairchild, "Distance metrics for very large color differences" (2020): HyAB.
+/// Distance of two colours: HyAB of S. Abasi, M. A. Tehran, M. D. Fairchild, "Distance metrics for very large color
+/// differences" (2020).
 fn distance(a: Seen, b: Seen) -> f32 {
     let chroma = [a[1] - b[1], a[2] - b[2]];
     (a[0] - b[0]).abs() + (chroma[0] * chroma[0] + chroma[1] * chroma[1]).sqrt()
 }
 
-/// The filters of luminance, red against green, and both bells of blue against yellow, each of sum 1; the weights of these
-/// two.
+/// Filters of luminance, red against green, and both Gaussians of blue against yellow, each of sum 1; and the weights of the
+/// latter two.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few tens; weights are single")]
 fn taps(pixels_per_degree: f64) -> (Vec<[f32; 4]>, [f32; 2]) {
     let sigma = |width: f64| (width / (2.0 * PI * PI)).sqrt() * pixels_per_degree;
@@ -73,7 +74,7 @@ fn taps(pixels_per_degree: f64) -> (Vec<[f32; 4]>, [f32; 2]) {
     let curves = bells.map(|(_, width)| bell(sigma(width), radius));
     let sums = curves.each_ref().map(|curve| curve.iter().sum::<f64>());
     let taps = (0..=2 * radius).map(|k| [0, 1, 2, 3].map(|n: usize| (curves[n][k] / sums[n]) as f32)).collect();
-    // In two dimensions a bell of height h has the sum h · (sum of its curve)².
+    // In two dimensions a Gaussian of height h has the sum h · (sum of its curve)².
     let volume = |n: usize| bells[n].0 * (PI / bells[n].1).sqrt() * sums[n] * sums[n];
     let all = volume(2) + volume(3);
     (taps, [(volume(2) / all) as f32, (volume(3) / all) as f32])
@@ -86,7 +87,7 @@ fn opponent(pixel: [f32; 3]) -> [f32; 4] {
     [116.0 * y - 16.0, 500.0 * (x - y), blue, blue]
 }
 
-/// Back to what a display can show.
+/// Converts YCxCz to linear Rec. 709, clamped to what a display can show.
 #[expect(clippy::cast_possible_truncation, reason = "single precision is enough for a colour")]
 fn displayed([y, cx, cz]: [f32; 3]) -> [f32; 3] {
     let y = (y + 16.0) / 116.0;
@@ -139,7 +140,7 @@ mod tests {
     fn white_and_black_have_the_lightness_of_the_standard() {
         assert!((lab([1.0; 3])[0] - 100.0).abs() < 1e-3 && lab([1.0; 3])[1].abs() < 1e-3);
         assert!(lab([0.0; 3])[0].abs() < 1e-3);
-        // Half of the light: L* = 116 ∛0.5 − 16.
+        // Half the light: L* = 116 ∛0.5 − 16.
         assert!((lab([0.5; 3])[0] - 76.069).abs() < 1e-2);
     }
 

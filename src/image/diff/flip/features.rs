@@ -1,16 +1,16 @@
-//! Edges and points, as receptive fields of the eye find them in the luminance.
+//! Edges and points in the luminance, as receptive fields of the eye detect them.
 
 use super::Displayed;
 use super::filter::{Along, Taps, bell, filtered, places};
 use rayon::prelude::*;
 
-/// Width of a feature, degrees of the visual field.
+/// Width of a feature, in degrees of the visual field.
 const WIDTH: f64 = 0.082;
 
-/// How strong the edge and the point at a pixel are.
+/// Strengths of the edge and of the point at a pixel.
 pub(super) type Features = [f32; 2];
 
-/// Those of each pixel.
+/// Features of each pixel.
 pub(super) fn features(picture: Displayed, pixels_per_degree: f64) -> Vec<Features> {
     let (smooth, slope, bend) = curves(pixels_per_degree);
     let every = |f: &dyn Fn(usize) -> [f32; 4]| (0..smooth.len()).map(f).collect::<Taps<4>>();
@@ -25,13 +25,13 @@ pub(super) fn features(picture: Displayed, pixels_per_degree: f64) -> Vec<Featur
         .collect()
 }
 
-/// The difference of features, 0..=1.
+/// Difference of features, 0..=1.
 pub(super) fn difference(a: Features, b: Features) -> f32 {
     let most = (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
     (most * std::f32::consts::FRAC_1_SQRT_2).sqrt()
 }
 
-/// A bell, its first and its second derivative; weights above zero have the sum 1, those below it −1.
+/// A Gaussian, its first and its second derivative; positive weights sum to 1, negative ones to −1.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few tens; weights are single")]
 fn curves(pixels_per_degree: f64) -> (Vec<f32>, Vec<f32>, Vec<f32>) {
     let sigma = 0.5 * WIDTH * pixels_per_degree;

@@ -1,18 +1,18 @@
-//! Filters that are a product of one along rows and one along columns.
+//! Separable filters: the product of one along rows and one along columns.
 
 use rayon::prelude::*;
 
-/// Weights of the places from `-radius` to `radius`, for each of `N` values of a pixel.
+/// Weights at the offsets from `-radius` to `radius`, for each of the `N` values of a pixel.
 pub(super) type Taps<const N: usize> = Vec<[f32; N]>;
 
-/// Which way a filter runs.
+/// Direction of a filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Along {
     Rows,
     Columns,
 }
 
-/// Filters `width` columns; beyond the edge lies the pixel at the edge.
+/// Filters pixels of `width` columns; beyond the edge the pixel at the edge is repeated.
 pub(super) fn filtered<const N: usize>(
     width: usize,
     pixels: &[[f32; N]],
@@ -40,12 +40,12 @@ pub(super) fn filtered<const N: usize>(
     out
 }
 
-/// `exp(-x² / 2σ²)` at the places from `-radius` to `radius`.
+/// Gaussian `exp(-x² / 2σ²)` at the offsets from `-radius` to `radius`.
 pub(super) fn bell(sigma: f64, radius: usize) -> Vec<f64> {
     places(radius).map(|x| libm::exp(-x * x / (2.0 * sigma * sigma))).collect()
 }
 
-/// From `-radius` to `radius`.
+/// Offsets from `-radius` to `radius`.
 pub(super) fn places(radius: usize) -> impl Iterator<Item = f64> {
     (0..=2 * radius).map(move |k| k as f64 - radius as f64)
 }

@@ -1,12 +1,12 @@
-//! FLIP: how different two pictures look to somebody who flips back and forth between them.
+//! FLIP: how different two pictures look to somebody who alternates between them.
 //!
 //! P. Andersson, J. Nilsson, T. Akenine-Möller, M. Oskarsson, K. Åström, M. D. Fairchild, "FLIP: A Difference Evaluator
 //! for Alternating Images" (2020); for linear pictures of any range P. Andersson, J. Nilsson, P. Shirley, T. Akenine-Möller,
 //! "Visualizing Errors in Rendered High Dynamic Range Images" (2021).
 //!
-//! A value is computed for each pixel, 0 (nobody sees a difference) to 1. Colours are filtered as the eye does from a given
-//! distance, and compared in a space where distances look even (`color`); edges and points are found and compared
-//! (`features`), and a difference of these raises that of the colours.
+//! Each pixel gets a value from 0 (no visible difference) to 1. Colours are filtered as the eye does from a given
+//! distance, and compared in a perceptually uniform space (`color`); edges and points are detected and compared
+//! (`features`), and their difference raises that of the colours.
 
 mod color;
 mod features;
@@ -15,7 +15,7 @@ pub mod range;
 
 use rayon::prelude::*;
 
-/// Pixels a degree of the visual field, for a screen of 3840 columns and 0.7 m, seen from 0.7 m.
+/// Pixels per degree of the visual field, for a screen of 3840 columns and 0.7 m, seen from 0.7 m.
 pub const PIXELS_PER_DEGREE: f64 = 3840.0 * std::f64::consts::PI / 180.0;
 
 /// A picture as it is displayed: linear Rec. 709, 0..=1, rows from the top.
@@ -23,11 +23,11 @@ pub const PIXELS_PER_DEGREE: f64 = 3840.0 * std::f64::consts::PI / 180.0;
 pub struct Displayed<'a> {
     /// Columns.
     pub width: usize,
-    /// `width × height` of them.
+    /// `width × height` pixels.
     pub pixels: &'a [[f32; 3]],
 }
 
-/// FLIP of each pixel; both pictures have one size.
+/// FLIP of each pixel; both pictures have the same size.
 pub fn flip(reference: Displayed, test: Displayed, pixels_per_degree: f64) -> Vec<f32> {
     let [seen, other] = [reference, test].map(|picture| color::seen(picture, pixels_per_degree));
     let [marks, others] = [reference, test].map(|picture| features::features(picture, pixels_per_degree));
@@ -43,7 +43,7 @@ mod tests {
     use crate::image::srgb;
     use crate::math::random::Random;
 
-    /// Smooth shades, an edge, a dot and noise: everything that the metric looks for.
+    /// Smooth shades, an edge, a dot and noise: everything that the metric detects.
     fn picture(width: u32, height: u32, seed: u64) -> Vec<[u8; 3]> {
         let mut random = Random::new(seed);
         let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));

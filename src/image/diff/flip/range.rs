@@ -1,33 +1,33 @@
-//! FLIP of linear pictures of any range: the worst that is seen at any exposure that somebody may look at them with.
+//! FLIP of linear pictures of any range: the largest difference over all exposures at which somebody may view them.
 
 use super::{Displayed, flip};
 use crate::image::tone::luminance;
 use rayon::prelude::*;
 
-/// The curve of K. Narkowicz, "ACES Filmic Tone Mapping Curve" (2015), with its exposure of 0.6: three coefficients above
-/// and three below the fraction.
+/// Curve of K. Narkowicz, "ACES Filmic Tone Mapping Curve" (2015), with its exposure of 0.6: three coefficients of the
+/// numerator and three of the denominator.
 const CURVE: [f64; 6] = [2.51 * 0.36, 0.03 * 0.6, 0.0, 2.43 * 0.36, 0.59 * 0.6, 0.14];
 
-/// What the brightest pixel comes to at the darkest exposure, and the median one at the brightest.
+/// Display value of the brightest pixel at the darkest exposure, and of the median pixel at the brightest.
 const BRIGHT: f64 = 0.85;
 
 /// Exposures, in stops: from the one at which the brightest pixel of the reference is just not blown out, to the one at
-/// which its median pixel is not; where that is black, the median of those that are not.
+/// which its median pixel is not; where that is black, the median of the pixels that are not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exposures {
-    /// The darkest.
+    /// The darkest exposure.
     pub first: f64,
-    /// The brightest.
+    /// The brightest exposure.
     pub last: f64,
-    /// How many, at equal distances.
+    /// Number of exposures, at equal distances.
     pub count: u32,
 }
 
 impl Exposures {
-    /// Exposures beyond which nobody looks.
+    /// Largest exposure, in stops either way; nobody views a picture beyond it.
     const MOST: f64 = 40.0;
 
-    /// Those for a picture, linear Rec. 709.
+    /// Exposures for a picture, linear Rec. 709.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most a few tens")]
     pub fn of(reference: &[[f32; 3]]) -> Self {
         let mut lights: Vec<f32> = reference.iter().map(|&p| luminance(p)).filter(|y| y.is_finite()).collect();
@@ -41,19 +41,19 @@ impl Exposures {
         Self { first, last, count: ((last - first).ceil() as u32).max(2) }
     }
 
-    /// The `k`th of them, from 0.
+    /// The `k`th exposure, counted from 0.
     pub fn stops(&self, k: u32) -> f64 {
         self.first + (self.last - self.first) * f64::from(k) / f64::from(self.count.max(2) - 1)
     }
 }
 
-/// The median of some numbers in order, one at least: the mean of the two in the middle.
+/// Median of a sorted, non-empty list: the mean of the two in the middle.
 fn middle(sorted: &[f32]) -> f64 {
     let n = sorted.len();
     0.5 * (f64::from(sorted[(n - 1) / 2]) + f64::from(sorted[n / 2]))
 }
 
-/// FLIP of each pixel: the greatest of all exposures. Pictures of `width` columns and one size, linear Rec. 709.
+/// FLIP of each pixel: the maximum over all exposures. Both pictures have `width` columns and one size, linear Rec. 709.
 pub fn flip_of_any_range(
     width: usize,
     reference: &[[f32; 3]],
@@ -79,12 +79,12 @@ fn developed(pixels: &[[f32; 3]], gain: f64) -> Vec<[f32; 3]> {
 
 fn curve(x: f64) -> f64 {
     let [a, b, c, d, e, f] = CURVE;
-    // Nothing is darker than black; beyond any display, infinity among it, the curve is flat.
+    // Negative light is black; beyond any display, infinity included, the curve is flat.
     let x = x.clamp(0.0, 1e6);
     (((a * x + b) * x + c) / ((d * x + e) * x + f)).clamp(0.0, 1.0)
 }
 
-/// The light that comes to a value of the display, greater than 0.
+/// Inverse of the curve: light that is displayed as `value`, which is greater than 0.
 fn shown_at(value: f64) -> f64 {
     let [a, b, c] = [0, 1, 2].map(|k: usize| CURVE[k] - value * CURVE[k + 3]);
     (-b + (b * b - 4.0 * a * c).sqrt()) / (2.0 * a)
@@ -103,14 +103,14 @@ mod tests {
         assert!((curve(16.0 * libm::exp2(exposures.stops(0))) - BRIGHT).abs() < 1e-6);
         assert!((curve(libm::exp2(exposures.stops(3))) - BRIGHT).abs() < 1e-6);
         assert_eq!(Exposures::of(&[grey(0.0)]).count, 1);
-        // As the authors' program finds them: black pixels count, and of two in the middle the mean.
+        // As the authors' program computes them: black pixels count, and of two in the middle the mean.
         let stops = |lights: &[f32]| {
             let Exposures { first, last, .. } = Exposures::of(&lights.iter().map(|&y| grey(y)).collect::<Vec<_>>());
             [first, last].map(|stops| (1000.0 * stops).round())
         };
         assert_eq!(stops(&[0.1, 0.2, 0.4, 0.8]), [1405.0, 2820.0]);
         assert_eq!(stops(&[0.01, 0.01, 1.0, 1.0]), [1083.0, 2069.0]);
-        // Most of it black.
+        // Mostly black.
         assert_eq!(stops(&[0.0, 0.0, 0.0, 1.0]), [1083.0, 1083.0]);
     }
 
