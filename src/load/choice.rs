@@ -1,20 +1,20 @@
-//! What the user wishes for by name or number: a scene, a variant of materials, an animation, a camera.
+//! Choices of the user by name or index: a scene, a variant of materials, an animation, a camera.
 
 use super::suggest::nearest;
 use super::{Diagnostic, Facts, Moment};
 use std::path::Path;
 
-/// A list of the file that something is chosen from; names in it may be empty, which is none.
+/// A list of the file that an item is chosen from; an empty name means that the item has none.
 pub(crate) struct Kind {
-    /// One of them.
+    /// Word for an item of the list.
     pub(crate) word: &'static str,
-    /// The list in the JSON of a glTF file.
+    /// JSON path of the list in a glTF file.
     pub(crate) list: &'static str,
-    /// Code of the message when there is no such thing.
+    /// Diagnostic code where no item matches.
     pub(crate) code: &'static str,
-    /// Code of the message where several have one name.
+    /// Diagnostic code where several items have the name.
     pub(crate) ambiguous: &'static str,
-    /// What there is to say where the list is empty.
+    /// Remedy where the list is empty.
     pub(crate) empty: &'static str,
 }
 
@@ -42,10 +42,10 @@ pub(super) const ANIMATION: Kind = Kind {
     ambiguous: "gltf-which-animation",
     empty: "the file has none",
 };
-/// Names in one message before the rest is only counted.
+/// Largest number of names in one message; the others are only counted.
 const LISTED: usize = 20;
 
-/// The number of what is called `wish`, or has that number where numbers begin with `first`.
+/// Index of the item named `wish`, or else of that number, where numbers begin with `first`.
 pub(super) fn find(names: &[&str], wish: &str, first: usize) -> Option<usize> {
     let by_number = || wish.parse::<usize>().ok()?.checked_sub(first).filter(|&i| i < names.len());
     names.iter().position(|name| is_called(name, wish)).or_else(by_number)
@@ -55,7 +55,7 @@ fn is_called(name: &str, wish: &str) -> bool {
     name == wish && !name.is_empty()
 }
 
-/// Refuses a wish for an animation that none of several models has, whose animations these are.
+/// Refuses a chosen animation that none of several models has; `facts` holds the animations of all of them.
 pub(super) fn check_animation(facts: &Facts, moment: &Moment, file: &Path) -> Result<(), Diagnostic> {
     let names: Vec<&str> = facts.animations.iter().map(|animation| animation.name.as_str()).collect();
     match &moment.animation {
@@ -64,7 +64,7 @@ pub(super) fn check_animation(facts: &Facts, moment: &Moment, file: &Path) -> Re
     }
 }
 
-/// Refuses a name that several have; numbers begin with `first`.
+/// Refuses a name that several items have; numbers begin with `first`.
 pub(super) fn check_name(
     kind: &Kind,
     names: &[&str],
@@ -81,10 +81,10 @@ pub(super) fn check_name(
     Err(Diagnostic::new(kind.ambiguous, file, kind.list, text).remedy(remedy))
 }
 
-/// The number of what is called `wish`, or has that number.
+/// Index of the item named `wish`, or else of that number.
 ///
 /// # Errors
-/// When there is no such thing, with a list of what there is; when several are called so.
+/// When there is no such item, with a list of those there are; when several have the name.
 pub(crate) fn choose(kind: &Kind, names: &[&str], wish: &str, file: &Path) -> Result<usize, Diagnostic> {
     check_name(kind, names, (wish, 0), file)?;
     find(names, wish, 0).ok_or_else(|| {
@@ -93,7 +93,7 @@ pub(crate) fn choose(kind: &Kind, names: &[&str], wish: &str, file: &Path) -> Re
     })
 }
 
-/// What there is instead of what was wished for.
+/// Remedy that lists the items there are, the most similar name first.
 fn instead(kind: &Kind, names: &[&str], wish: &str) -> String {
     if names.is_empty() {
         return kind.empty.into();

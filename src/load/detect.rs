@@ -1,6 +1,6 @@
-//! What kind of file this is: by its content, then by its extension.
+//! Detects the kind of a file: by its content, then by its extension.
 //!
-//! Kinds that cannot be read are named, so that the user knows what to do.
+//! Kinds that cannot be read are named in the error, so that the user knows what to do.
 
 use super::stl::{self, Encoding};
 use super::text::without_mark;
@@ -18,7 +18,7 @@ pub(super) enum Format {
     Stl(Encoding),
 }
 
-/// Beginnings of files, and what they are.
+/// Magic bytes of kinds that cannot be read, and their names.
 const FOREIGN: &[(&[u8], &str)] = &[
     (b"Kaydara FBX Binary", "an FBX file"),
     (b"; FBX", "an FBX file"),
@@ -47,13 +47,13 @@ const FOREIGN: &[(&[u8], &str)] = &[
 const LFS_POINTER: &str = "a Git LFS pointer, not the file itself";
 const EMPTY: &str = "empty";
 
-/// How a zip archive begins.
+/// Magic bytes of a zip archive.
 pub(super) const ZIP: &[u8; 4] = b"PK\x03\x04";
 
-/// Extensions of kinds that are zip archives of what they hold.
+/// Extensions of model kinds that are zip archives.
 const ZIPPED: [&str; 2] = ["usdz", "3mf"];
 
-/// Extensions of kinds that have no sure beginning.
+/// Extensions of kinds without reliable magic bytes.
 const FOREIGN_EXTENSIONS: &[(&str, &str)] = &[
     ("fbx", "an FBX file"),
     ("dae", "a COLLADA file"),
@@ -73,12 +73,12 @@ const FOREIGN_EXTENSIONS: &[(&str, &str)] = &[
     ("bin", "a binary buffer, not a model"),
 ];
 
-/// Whether a file that is a zip archive is a model of another kind by its name.
+/// Whether a zip archive is a model of another kind, by its extension.
 pub(super) fn is_zipped_kind(path: &Path) -> bool {
     path.extension().is_some_and(|extension| ZIPPED.iter().any(|zipped| extension.eq_ignore_ascii_case(zipped)))
 }
 
-/// Names the kind of `source`, or says what it is instead.
+/// Detects the kind of `source`; the error names a kind that cannot be read.
 pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
     let bytes = without_mark(&source.bytes);
     let text = bytes.trim_ascii_start();
@@ -97,7 +97,7 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
         return Ok(Format::Stl(Encoding::Text));
     }
     if let Some(kind) = by_beginning(bytes) {
-        // Some kinds are archives of a certain content.
+        // Some kinds are zip archives of a certain content.
         let inner = FOREIGN_EXTENSIONS.iter().find(|(ending, _)| *ending == extension && ZIPPED.contains(ending));
         return Err(foreign(source, inner.filter(|_| bytes.starts_with(ZIP)).map_or(kind, |(_, kind)| kind)));
     }
@@ -127,7 +127,7 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
     by_lines(text).ok_or_else(|| foreign(source, if bytes.is_empty() { EMPTY } else { "of an unknown kind" }))
 }
 
-/// What a file is that should hold lines of words and numbers; `None` where it may be that.
+/// Name of a kind that is not plain text; `None` where the bytes may be lines of words and numbers.
 pub(super) fn other_than_text(bytes: &[u8]) -> Option<&'static str> {
     let bytes = without_mark(bytes);
     by_beginning(bytes).or_else(|| marked_up(bytes.trim_ascii_start()))
@@ -141,12 +141,12 @@ fn marked_up(text: &[u8]) -> Option<&'static str> {
     text.starts_with(b"<").then(|| if has(text, b"<COLLADA") { "a COLLADA file" } else { "an XML or HTML file" })
 }
 
-/// Extensions of models, that which says most of a model first: with materials and all that belongs to it in one file, with
-/// materials, without.
+/// Extensions of models, from the most to the least complete: with materials and buffers in one file, with materials,
+/// without.
 pub(super) const MODELS: [&str; 7] = ["glb", "gltf", "vrm", "obj", "ply", "stl", "nff"];
 
-/// Whether a file has a name as models have: one that ends in `.glb`, `.gltf`, `.vrm` (avatars in GLB), `.obj`, `.ply`, `.stl` or
-/// `.nff`, in letters of either case.
+/// Whether a file has the extension of a model: `.glb`, `.gltf`, `.vrm` (avatars in GLB), `.obj`, `.ply`, `.stl` or
+/// `.nff`, in either case.
 pub fn is_called_a_model(path: &Path) -> bool {
     MODELS.iter().any(|known| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(known)))
 }
@@ -161,7 +161,7 @@ fn foreign(source: &Source, kind: &str) -> Diagnostic {
     Diagnostic::new("unsupported-format", &source.path, "", format!("this is {kind}")).remedy(remedy)
 }
 
-/// Whether this is STL as text: `solid` and whatever name, then `facet` on one of the next lines, or the end at once.
+/// Whether a text is STL: `solid` and any name, then `facet` on one of the next lines, or the end of the file.
 fn is_stl_text(text: &[u8]) -> bool {
     let first_is = |line: &[u8], words: &[&[u8]]| {
         let first = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
@@ -172,16 +172,16 @@ fn is_stl_text(text: &[u8]) -> bool {
         && lines.next().is_some_and(|line| first_is(line, &[b"facet", b"endsolid"]))
 }
 
-/// What an STL file was meant to be that is neither as long as it says nor begins as text should.
+/// Encoding that a damaged STL file was meant to have: its length does not match, and it does not begin as text should.
 fn damaged_stl(text: &[u8]) -> Encoding {
     let start = &text[..text.len().min(512)];
     let begins = text.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
-    // Remarks may stand before it.
+    // Comments may stand before it.
     let is_text = (begins || has(&start.to_ascii_lowercase(), b"facet normal")) && !start.contains(&0);
     if is_text { Encoding::Text } else { Encoding::Binary }
 }
 
-/// Whether the start of a file, longer than the header of a binary STL, is text.
+/// Whether the start of a file that is longer than the header of a binary STL is text.
 fn is_plain(text: &[u8]) -> bool {
     let start = &text[..text.len().min(512)];
     start.len() > 84
@@ -192,7 +192,7 @@ fn has(bytes: &[u8], part: &[u8]) -> bool {
     bytes.windows(part.len()).take(4096).any(|w| w == part)
 }
 
-/// Tells OBJ, NFF and a scene file apart by the first line that can only be one of them.
+/// Tells OBJ, NFF and scene files apart by the first line that can belong to only one of them.
 fn by_lines(text: &[u8]) -> Option<Format> {
     const OBJ: [&[u8]; 9] = [b"v", b"vt", b"vn", b"f", b"o", b"g", b"usemtl", b"mtllib", b"s"];
     for line in text.split(|&b| b == b'\n' || b == b'\r').take(1000) {
@@ -239,7 +239,7 @@ mod tests {
     fn a_text_that_is_called_stl_is_no_binary_one() {
         let users = "root:x:0:0:root:/root:/bin/sh\n".repeat(20);
         assert!(of("a.stl", users.as_bytes()).unwrap_err().starts_with("a.stl: this is a text that is no STL"));
-        // Cut off inside its header, a binary one may be text so far.
+        // Truncated within its header, a binary STL may look like text.
         assert_eq!(of("a.stl", &users.as_bytes()[..80]), Ok(Format::Stl(Encoding::Binary)));
     }
 
@@ -265,7 +265,7 @@ mod tests {
         assert_eq!(of("-", b"solid a b\n\n facet normal 0 0 1"), text);
         assert_eq!(of("a.stl", b"SOLID\nwhat?"), text);
         assert!(of("-", b"solid rock is heavy\nand so on").is_err());
-        // A header that begins like text makes no text of a file that is as long as it says.
+        // A header that begins like text does not make a file text whose length matches its count.
         let mut named = b"solid facet".to_vec();
         named.resize(84 + 50, 0);
         named[80] = 1;

@@ -1,43 +1,43 @@
-//! What loading has to tell: one fault or warning is a value with a place, the numbers and a remedy. Only `cli` prints.
+//! Messages of loading: a fault or warning is a value with a place, the numbers and a remedy. Only `cli` prints.
 
 use super::limits::OverBudget;
 use std::collections::HashMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// The code of everything that takes more memory than is left.
+/// Code of every fault for lack of memory.
 pub(crate) const OVER_MEMORY: &str = "over-memory";
 
-/// What helps against that.
+/// Remedy for a lack of memory.
 pub(crate) const RAISE_MEMORY: &str = "raise --max-memory";
 
-/// What helps against a file that ends too early.
+/// Remedy for a truncated file.
 pub(super) const CUT_OFF: &str = "it was cut off; get it again";
 
-/// What helps against a file that says what cannot be.
+/// Remedy for a file whose contents contradict themselves.
 pub(super) const DAMAGED: &str = "it is damaged; export it again";
 
-/// One thing worth telling the user.
+/// A fault or warning for the user.
 ///
 /// Displayed as `file:place: text (×count); remedy`, one line, lower case after the place, no final period.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Diagnostic {
     /// Stable kebab-case name of this kind of message, such as `gltf-index-out-of-range`.
     pub code: &'static str,
-    /// The file it is about.
+    /// File that the message is about.
     pub file: PathBuf,
     /// Line (`118`) or JSON path (`meshes[2].primitives[0].indices`); empty: the file as a whole.
     pub place: String,
     /// What is wrong, with the numbers.
     pub text: String,
-    /// What the user can do, or what is drawn all the same; may be empty.
+    /// What the user can do, or what is drawn instead; may be empty.
     pub remedy: String,
-    /// How often it was met; the place is the first.
+    /// Number of occurrences; the place is that of the first.
     pub count: u32,
 }
 
 impl Diagnostic {
-    /// A message met once.
+    /// Message with a count of 1.
     pub fn new(
         code: &'static str,
         file: impl Into<PathBuf>,
@@ -47,17 +47,17 @@ impl Diagnostic {
         Self { code, file: file.into(), place: place.into(), text: text.into(), remedy: String::new(), count: 1 }
     }
 
-    /// Something takes more memory than is left.
+    /// Fault: something takes more memory than is left.
     pub(super) fn over_memory(file: impl Into<PathBuf>, place: impl Into<String>, text: impl Into<String>) -> Self {
         Self::new(OVER_MEMORY, file, place, text).remedy(RAISE_MEMORY)
     }
 
-    /// A file holds more than memory is left for.
+    /// Fault: a file needs more memory than is left.
     pub(super) fn over_budget(file: &Path, over: OverBudget) -> Self {
         Self::over_memory(file, "", over.to_string())
     }
 
-    /// Adds what the user can do.
+    /// Sets the remedy.
     #[must_use]
     pub fn remedy(mut self, remedy: impl Into<String>) -> Self {
         self.remedy = remedy.into();
@@ -67,7 +67,7 @@ impl Diagnostic {
 
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // A file name may hold anything; a message must stay one line and leave the terminal alone.
+        // A file name may hold anything; a message must stay one line and keep control characters from the terminal.
         let clean = |s: &str| s.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect::<String>();
         if !self.file.as_os_str().is_empty() {
             write!(f, "{}:", clean(&self.file.to_string_lossy()))?;
@@ -76,7 +76,7 @@ impl fmt::Display for Diagnostic {
             }
             f.write_str(" ")?;
         }
-        // Texts of libraries may end in an empty line.
+        // Messages of libraries may end in an empty line.
         f.write_str(&clean(self.text.trim_end()))?;
         if self.count > 1 {
             write!(f, " (×{})", self.count)?;
@@ -88,7 +88,7 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// Why nothing could be loaded; what a retry can do decides the kind.
+/// Why nothing could be loaded; the variant tells whether a retry can help.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The file could not be read: a retry may help (exit code 1).
@@ -96,10 +96,10 @@ pub enum LoadError {
     Read {
         /// What was being read.
         what: Box<Diagnostic>,
-        /// What the system said.
+        /// The I/O error.
         source: std::io::Error,
     },
-    /// The input is broken, unsupported, empty or too large: a retry is useless (exit code 3), but for one that needs more
+    /// The input is broken, unsupported, empty or too large: a retry is useless (exit code 3), except where it needs more
     /// memory than it may take (exit code 1).
     #[error("{}", join(.0))]
     Input(
@@ -118,33 +118,33 @@ impl From<Diagnostic> for LoadError {
     }
 }
 
-/// Gathers warnings; those of one kind are counted, not repeated.
+/// Collects warnings; repeated ones of a kind are counted.
 ///
-/// Of one code, only so many kinds are kept; the others become one last warning of that code, which counts them. So
+/// Only [`Self::KEPT`] kinds of one code are kept; the others become one last warning of that code, which counts them. So
 /// neither memory nor the list grows with the number of warnings.
 #[derive(Clone, Debug, Default)]
 pub struct Warnings {
     list: Vec<(Kind, Diagnostic)>,
-    /// Where each kind is in the list.
+    /// Index in the list, by kind.
     known: HashMap<Kind, usize>,
-    /// How many kinds of each code are kept.
+    /// Number of kinds met, by code.
     kinds: HashMap<&'static str, usize>,
 }
 
-/// What is told once: a code, a file, and what tells kinds of one code apart.
+/// Key of a warning: a code, a file, and a text that tells kinds of one code apart.
 type Kind = (&'static str, PathBuf, String);
 
 impl Warnings {
-    /// Kinds of one code that are kept.
+    /// Largest number of kinds of one code that are kept.
     const KEPT: usize = 20;
 
-    /// Adds one, or counts it when one with the same code, file and text is there.
+    /// Adds a warning, or counts it when one with the same code, file and text exists.
     pub fn push(&mut self, warning: Diagnostic) {
         let kind = warning.text.clone();
         self.push_kind(warning, kind);
     }
 
-    /// Adds one, or counts it when one with the same code, file and `kind` is there, whatever their texts say.
+    /// Adds a warning, or counts it when one with the same code, file and `kind` exists, whatever their texts.
     pub fn push_kind(&mut self, warning: Diagnostic, kind: String) {
         let kind = (warning.code, warning.file.clone(), kind);
         if let Some(&at) = self.known.get(&kind) {
@@ -155,7 +155,7 @@ impl Warnings {
         if *kept <= Self::KEPT {
             return self.keep(kind, warning);
         }
-        // The name of no kind: texts have no control characters that matter.
+        // Key that no kind has: their texts have no zero bytes.
         let rest = (warning.code, PathBuf::new(), "\0".to_owned());
         match self.known.get(&rest) {
             Some(&at) => {
@@ -185,17 +185,17 @@ impl Warnings {
         known.count = known.count.saturating_add(more);
     }
 
-    /// Whether there is none.
+    /// Whether there are no warnings.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
 
-    /// All of them, in the order first met.
+    /// All warnings, in the order first met.
     pub fn into_vec(self) -> Vec<Diagnostic> {
         self.list.into_iter().map(|(_, warning)| warning).collect()
     }
 
-    /// Adds those of another.
+    /// Adds the warnings of another collection.
     pub fn extend(&mut self, other: Self) {
         other.list.into_iter().for_each(|((_, _, kind), warning)| self.push_kind(warning, kind));
     }

@@ -1,31 +1,31 @@
-//! Finds the files that models name: libraries of materials, pictures, buffers.
+//! Finds the files that models name: material libraries, pictures, buffers.
 //!
 //! Names come from other machines: with backslashes, with folders that were not shipped, in another case, and several
-//! on one line although names may hold spaces. A file found elsewhere than its name says costs a warning; everything is
+//! on one line although names may hold spaces. A file found elsewhere than its name says costs a warning; every file is
 //! read through the [`Resolver`], so nothing outside the root is.
 
 use crate::load::paths::{FileFault, Found, Resolver};
 use std::path::{Component, Path, PathBuf};
 
-/// Reads files by careless names.
+/// Finds and reads files by inexact names.
 pub(super) struct Finder<'a> {
     pub resolver: &'a mut Resolver,
-    /// Names of the model that were not found anywhere.
+    /// Number of names of the model that were not found anywhere.
     pub missed: &'a mut usize,
 }
 
-/// After so many names that were not found anywhere others are looked for only where they say: each takes many looks into
+/// Number of misses after which further names are looked up only as written, as every guess searches several
 /// folders.
 const MISSES: usize = 256;
 
-/// Where a file is.
+/// Location of a file.
 #[derive(Debug)]
 pub(super) struct FoundPath {
     /// Path relative to the model's folder, or absolute.
     pub path: PathBuf,
-    /// One path for all names of a file.
+    /// Canonical path, the same for all names of a file.
     pub canonical: PathBuf,
-    /// Whether it lies elsewhere than its name says.
+    /// Whether the file lies elsewhere than its name says.
     pub guessed: bool,
 }
 
@@ -36,8 +36,8 @@ impl Finder<'_> {
         Ok(Found { bytes: self.resolver.read_file(&path)?, path, guessed })
     }
 
-    /// Finds `name`, looking in `folders` (relative to the model's), first as written, then in any case, then without its
-    /// first folders, as written and in any case, then in folders that pictures are in, at last as a picture of another kind.
+    /// Finds `name` in `folders` (relative to the model's): first as written, then in any case, then without its first
+    /// folders, as written and in any case, then in folders that pictures are shipped in, last as a picture of another kind.
     /// The fault is that of the name as written.
     pub(super) fn find(&mut self, name: &str, folders: &[&Path]) -> Result<FoundPath, FileFault> {
         let slashed = name.replace('\\', "/");
@@ -52,7 +52,7 @@ impl Finder<'_> {
             }
         }
         self.elsewhere(&slashed, folders).ok_or_else(|| match fault {
-            // As written, not with the folder it was looked for in.
+            // The name as written, without the folder that was searched.
             Some(fault) if !fault.is_missing() => fault,
             _ => self.resolver.missing(Path::new(name)),
         })
@@ -90,7 +90,7 @@ impl Finder<'_> {
         if let Ok(found) = self.as_written(unquote(&unescaped)) {
             return vec![Ok(found)];
         }
-        // As many words as make the name of a file, or as few as end like one.
+        // Take as many words as make the name of a file, or as few as end like one.
         let words: Vec<String> = words(names);
         let mut out = Vec::new();
         let mut start = 0;
@@ -125,14 +125,14 @@ impl Finder<'_> {
     }
 }
 
-/// Folders that pictures are put in when a model is shipped.
+/// Folders that pictures are shipped in.
 const FOLDERS: [&str; 5] = ["textures", "texture", "maps", "images", "tex"];
 
-/// Kinds of pictures that others are converted to before they are shipped, and these others.
+/// Kinds of pictures that others are converted to before they are shipped, and the kinds that are converted.
 const KINDS: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
 const CONVERTED: [&str; 9] = ["tif", "tiff", "tga", "bmp", "gif", "psd", "dds", "exr", "hdr"];
 
-/// Where the picture of a name may lie, and what it may have become.
+/// Paths that a picture may have been moved or converted to.
 fn moved_or_converted(name: &Path) -> Vec<PathBuf> {
     let extension = name.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     if !KINDS.iter().chain(&CONVERTED).any(|kind| extension.eq_ignore_ascii_case(kind)) {
@@ -143,26 +143,26 @@ fn moved_or_converted(name: &Path) -> Vec<PathBuf> {
     names.flat_map(in_folders).collect()
 }
 
-/// The last parts of a path, the longest first, at most four of them: of `C:/Users/me/house/maps/a.png` these are
+/// Tails of a path, the longest first, of at most four components: for `C:/Users/me/house/maps/a.png` these are
 /// `me/house/maps/a.png`, `house/maps/a.png`, `maps/a.png` and `a.png`.
 fn without_first_folders(name: &str) -> Vec<PathBuf> {
-    /// Each takes a look into folders.
+    /// Most components of a tail; each tail costs file lookups.
     const MOST: usize = 4;
     let parts: Vec<Component> = Path::new(name).components().collect();
     let shorter = (1..parts.len()).map(|first| &parts[first..]).filter(|parts| parts.len() <= MOST);
     let is_plain = |parts: &&[Component]| parts.iter().all(|part| matches!(part, Component::Normal(_)));
     let mut all: Vec<PathBuf> = shorter.filter(is_plain).map(PathBuf::from_iter).collect();
-    // Of a name without folders it is the name.
+    // A name without folders is its own tail.
     if let [Component::Normal(last)] = parts[..] {
         all.push(last.into());
     }
     all
 }
 
-/// Words of one `mtllib` statement that are tried as one name; bounds the time.
+/// Most words of one `mtllib` statement that are tried as one name; bounds the time.
 const WORDS: usize = 32;
 
-/// Words between white space; a backslash keeps the space after it, quotes keep the spaces between them.
+/// Splits at white space; a backslash keeps the space after it, quotes keep the spaces between them.
 fn words(names: &str) -> Vec<String> {
     let mut out = vec![String::new()];
     let mut quoted = false;
@@ -180,7 +180,7 @@ fn words(names: &str) -> Vec<String> {
     out
 }
 
-/// A name without the quotes around it.
+/// Name without the quotes around it.
 pub(super) fn unquote(name: &str) -> &str {
     name.strip_prefix('"').and_then(|n| n.strip_suffix('"')).unwrap_or(name)
 }
@@ -240,7 +240,7 @@ mod tests {
         assert!(many.iter().all(|told| told.len() < 200), "{}", many[0].len());
     }
 
-    // Where names in another case are other files.
+    // Only where file names are case-sensitive.
     #[cfg(target_os = "linux")]
     #[test]
     fn files_are_found_by_their_last_name_and_in_another_case() {

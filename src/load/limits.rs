@@ -1,11 +1,11 @@
-//! Bounds that are checked before memory is taken.
+//! Limits that are checked before memory is allocated.
 
 use super::diagnostic::RAISE_MEMORY;
 
-/// Largest sizes a file may ask for.
+/// Largest sizes that a file may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Bytes all of loading may take (`--max-memory`).
+    /// Bytes that loading may take altogether (`--max-memory`).
     pub memory: u64,
     /// Bytes of one file.
     pub file: u64,
@@ -20,15 +20,15 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// What lets a larger file in: more memory, unless a file may not be larger whatever the memory.
+    /// Remedy for a file that is too large: more memory, unless the limit of a file does not depend on it.
     pub(super) fn remedy_for_file(&self) -> &'static str {
         if self.file == self.memory { RAISE_MEMORY } else { "split it" }
     }
 }
 
-/// Memory that may still be taken.
+/// Memory that may still be allocated.
 ///
-/// Loaders ask before they allocate anything whose size a file decides; a file of a few bytes cannot make them
+/// Loaders take from it before they allocate anything whose size a file decides; a file of a few bytes cannot make them
 /// allocate gigabytes beyond the limit.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
@@ -36,11 +36,11 @@ pub struct Budget {
     left: u64,
 }
 
-/// The request that did not fit.
+/// A request that exceeded the budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{asked} bytes are needed where {left} of {total} are left")]
 pub struct OverBudget {
-    /// Bytes asked for.
+    /// Bytes requested.
     pub asked: u64,
     /// Bytes that were left.
     pub left: u64,
@@ -49,17 +49,17 @@ pub struct OverBudget {
 }
 
 impl Budget {
-    /// A budget of [`Limits::memory`] bytes.
+    /// Budget of [`Limits::memory`] bytes.
     pub fn new(limits: &Limits) -> Self {
         Self { total: limits.memory, left: limits.memory }
     }
 
-    /// Bytes that are left.
+    /// Bytes left.
     pub fn left(&self) -> u64 {
         self.left
     }
 
-    /// Takes `count` elements of `size` bytes, or says why not.
+    /// Takes `count` elements of `size` bytes from the budget.
     pub fn take(&mut self, count: u64, size: u64) -> Result<(), OverBudget> {
         let asked = count.saturating_mul(size);
         let over = OverBudget { asked, left: self.left, total: self.total };

@@ -1,7 +1,7 @@
-//! Files -> [`Scene`] + warnings. The kind of file is found by content, then by extension.
+//! Files -> [`Scene`] + warnings. The kind of a file is found by content, then by extension.
 //!
 //! Files a user gives are not trusted: other files they name are read only below [`LoadOptions::root`], sizes are
-//! checked before memory is taken, and whatever is broken ends in a [`LoadError`] or in a warning, never in a panic.
+//! checked before memory is allocated, and broken input ends in a [`LoadError`] or in a warning, never in a panic.
 
 pub mod archive;
 pub(crate) mod choice;
@@ -44,95 +44,95 @@ use crate::stopwatch::{Spent, Stopwatch};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// How to load.
+/// Options of loading.
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
-    /// Files are read only below this folder; `None`: the folder of the model. What a model in an archive names is read from
-    /// that archive alone.
+    /// Folder below which alone files are read; `None`: the folder of the model. Files that a model in an archive names are
+    /// read from that archive alone.
     pub root: Option<PathBuf>,
-    /// Bounds on memory and sizes.
+    /// Limits of memory and sizes.
     pub limits: Limits,
-    /// What becomes of OBJ, PLY and NFF faces with more than three corners.
+    /// Treatment of OBJ, PLY and NFF faces with more than three corners.
     pub polygons: Polygons,
-    /// How MTL text is understood.
+    /// Interpretation of MTL text.
     pub mtl: MtlMode,
-    /// Which scene of a glTF file: an index, or a name; `None`: the default scene. Refused where the file has none.
+    /// Scene of a glTF file to load: an index, or a name; `None`: the default scene. Refused where the file has none.
     pub scene: Option<String>,
-    /// Which variant of materials of a glTF file (KHR_materials_variants): a name, or a number from 0; `None`: the
+    /// Variant of materials of a glTF file (KHR_materials_variants): a name, or a number from 0; `None`: the
     /// materials that primitives name themselves. Refused where the file has none.
     pub variant: Option<String>,
     /// Overrides the up axis.
     pub up: Option<UpAxis>,
-    /// Which moment of an animation of a glTF file is shown; `None`: the rest pose.
+    /// Moment of an animation of a glTF file to show; `None`: the rest pose.
     pub moment: Option<Moment>,
-    /// For one of several models that are shown together: how many animations those before it have. Numbers of animations
-    /// count on from there, and one that it lacks may be another's: it is at rest then.
+    /// For one of several models that are shown together: number of animations of the models before it. Numbers of animations
+    /// count on from there, and one that this model lacks may belong to another: it stays at rest then.
     pub animations_before: Option<usize>,
-    /// Gives meshes without normals smooth ones, but for edges at which faces lean by more than so many radians; `None`:
-    /// their faces are flat.
+    /// Generates smooth normals for meshes without normals, except at edges where faces lean by more than this angle, in
+    /// radians; `None`: their faces are flat.
     pub smooth: Option<f64>,
-    /// How wide points and lines are, world units; `None`: 1/256 of what is drawn, or less where there are very many.
+    /// Widths of points and lines, world units; `None`: 1/256 of what is drawn, or less where there are very many.
     pub wire_widths: Option<[f64; 2]>,
-    /// Leaves pictures out: for whoever needs the geometry of a glTF file alone.
+    /// Leaves pictures out: for callers that need the geometry of a glTF file alone.
     pub without_pictures: bool,
 }
 
 /// A moment of an animation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Moment {
-    /// Which animation: an index, or a name; `None`: the first.
+    /// Animation: an index, or a name; `None`: the first.
     pub animation: Option<String>,
-    /// Seconds from its start; finite. Before the first and after the last key those count.
+    /// Seconds from the start of the animation; finite. Clamped to its first and last key.
     pub time: f64,
 }
 
-/// What becomes of OBJ, PLY and NFF faces with more than three corners.
+/// Treatment of OBJ, PLY and NFF faces with more than three corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Polygons {
     /// Cut into triangles by exact ear clipping.
     #[default]
     Cut,
-    /// Planar ones of up to [`Polygons::MOST_CORNERS`] stay whole.
+    /// Planar faces of up to [`Polygons::MOST_CORNERS`] corners stay whole.
     Whole,
 }
 
 impl Polygons {
-    /// Corners of a face that may stay whole: every test of it looks at all of them.
+    /// Most corners of a face that stays whole: every ray test of the face visits all of them.
     pub const MOST_CORNERS: usize = 256;
 
-    /// Whether a face of so many corners is kept whole if it is planar.
+    /// Whether a face of that many corners is kept whole if it is planar.
     pub(crate) fn keeps(self, corners: usize) -> bool {
         self == Self::Whole && (4..=Self::MOST_CORNERS).contains(&corners)
     }
 }
 
-/// How MTL text is understood.
+/// Interpretation of MTL text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MtlMode {
     /// What exporters mean: carelessly written defaults are replaced, each with a counted warning.
     #[default]
     Guess,
-    /// What the text says.
+    /// The text as written.
     Literal,
 }
 
-/// What a file gave.
+/// Result of loading a file.
 #[derive(Clone, Debug, Default)]
 pub struct Loaded {
     /// The scene.
     pub scene: Scene,
-    /// What could not be drawn as the file says.
+    /// Differences between the file and what is drawn.
     pub warnings: Vec<Diagnostic>,
     /// Facts for reports.
     pub facts: Facts,
 }
 
-/// What loading found out besides the scene.
+/// Facts about the file besides the scene.
 #[derive(Clone, Debug, Default)]
 pub struct Facts {
     /// `glTF 2.0 (binary)`, `Wavefront OBJ`, `NFF`, `PLY (ascii)`, `STL (binary)`, `meshray scene`.
     pub format: String,
-    /// Program that wrote the file, if it says.
+    /// Program that wrote the file; empty if the file does not say.
     pub generator: String,
     /// Faces of the file that became triangles or polygons.
     pub faces: u64,
@@ -142,44 +142,44 @@ pub struct Facts {
     pub wires: WireFacts,
     /// Animations in the file.
     pub animations: Vec<AnimationFacts>,
-    /// Which of them is shown, and when, seconds from its start; `None`: the rest pose. Of several models the first that
-    /// is not at rest counts.
+    /// Index of the animation that is shown, and its time in seconds from its start; `None`: the rest pose. Of several models,
+    /// the first that is not at rest counts.
     pub shown: Option<(usize, f64)>,
-    /// Whether that changes materials, or which nodes are visible: other moments may show pictures that this one does not.
+    /// Whether that animation changes materials or node visibility: other moments may show pictures that this one does not.
     pub changes_materials: bool,
     /// glTF extensions that the file names, each once.
     pub extensions: Vec<ExtensionFacts>,
     /// Names of the scenes in the file; the loaded one is `scene_index`.
     pub scenes: Vec<String>,
-    /// Which scene was loaded.
+    /// Index of the loaded scene.
     pub scene_index: usize,
     /// Names of the variants of materials in the file.
     pub variants: Vec<String>,
-    /// Which of them was loaded, if one was asked for.
+    /// Index of the loaded variant, if one was chosen.
     pub variant: Option<usize>,
-    /// Why the up axis was chosen, when it was a guess.
+    /// Reason for the up axis, where it was guessed.
     pub up_reason: Option<String>,
-    /// Largest displacement of a vertex by rounding to `f32` while loading, world units; placing moves it once more
+    /// Largest displacement of a vertex by rounding to `f32` while loading, world units; placing in the world rounds once more
     /// ([`World::rounding`](crate::render::World::rounding)).
     pub max_rounding: f64,
     /// Every file read: the model first, then buffers, images, MTLs. For the input hash and `inspect`.
     pub files: Vec<FileRead>,
-    /// xxh3-128 of the xxh3-128 hashes of all files in `files`, in that order (see [`paths::Resolver::finish`]); of the
-    /// files of a model that a scene file shows the first counts with the hash of the model, and the others with 0.
+    /// xxh3-128 of the xxh3-128 hashes of all files in `files`, in that order (see [`paths::Resolver::finish`]). Of the
+    /// files of a model that a scene file shows, the first counts with the hash of the model, the others with 0.
     pub hash: u128,
-    /// Whether a file was looked for where it was not: in vain, or before it was found elsewhere.
+    /// Whether a file was missing at a path where it was looked up, even if it was found elsewhere later.
     pub gaps: bool,
-    /// Bytes of memory that the scene takes once it is loaded, with room for smaller copies of its pictures; loading itself takes
-    /// more for a while.
+    /// Bytes of memory of the loaded scene, with room for the mip levels of its pictures; loading itself takes more for a
+    /// while.
     pub kept: u64,
-    /// Time that reading the bytes of all files took, of the thread that did it.
+    /// Time spent on reading the bytes of all files, by the thread that read them.
     pub reading: Spent,
-    /// Time that decoding pictures took: from the first to the last, and of all threads together.
+    /// Time spent on decoding pictures: wall-clock time from the first to the last, processor time of all threads.
     pub decoding: Spent,
 }
 
 impl Facts {
-    /// Adds the animations of one more model of several.
+    /// Appends the animations of another of several models.
     pub(crate) fn add_animations(&mut self, more: &Self) {
         let before = self.animations.len();
         self.shown = self.shown.or(more.shown.map(|(number, time)| (before + number, time)));
@@ -193,54 +193,54 @@ impl Facts {
 pub struct AnimationFacts {
     /// Its name; empty if it has none.
     pub name: String,
-    /// When its last key is, seconds from its start.
+    /// Time of the last key, in seconds from the start.
     pub seconds: f64,
-    /// How many properties of nodes it changes.
+    /// Number of node properties that the animation changes.
     pub channels: usize,
 }
 
-/// An extension of glTF that a file names.
+/// A glTF extension that a file names.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ExtensionFacts {
     /// Its name, such as `KHR_materials_volume`.
     pub name: String,
-    /// Whether the file says that it cannot be shown without.
+    /// Whether the file declares that it cannot be shown without the extension.
     pub required: bool,
-    /// Whether it is drawn as it says.
+    /// Whether the extension is drawn as specified.
     pub supported: bool,
 }
 
 /// A file in memory, with the name it was read from.
 #[derive(Clone, Debug, Default)]
 pub struct Source {
-    /// Where it came from; a name without a folder such as `-` for standard input.
+    /// Path of the file; a name without a folder such as `-` for standard input.
     pub path: PathBuf,
     /// Its bytes.
     pub bytes: Vec<u8>,
-    /// The archive that it lies in, if it does.
+    /// The archive that the file lies in, if any.
     pub within: Option<Arc<Archive>>,
-    /// How it was chosen from that, where that has to be told.
+    /// Note on how the file was chosen from the archive, where the user should know.
     pub note: Option<Diagnostic>,
 }
 
 impl Source {
-    /// One that lies in no archive.
+    /// Source that lies in no archive.
     pub fn new(path: PathBuf, bytes: Vec<u8>) -> Self {
         Self { path, bytes, within: None, note: None }
     }
 
-    /// Whether it came from standard input.
+    /// Whether the source is standard input.
     pub fn is_stdin(&self) -> bool {
         self.path == Path::new("-")
     }
 }
 
-/// Loads a model or scene file, or the only model of a zip archive. One of several in an archive is named as in a folder:
-/// `ships.zip/tug/tug.gltf`.
+/// Loads a model or scene file, or the only model of a zip archive. One of several models in an archive is named as in a
+/// folder: `ships.zip/tug/tug.gltf`.
 ///
 /// # Errors
-/// [`LoadError::Read`] when the file itself cannot be read, [`LoadError::Input`] when what it holds cannot be drawn.
-/// A file that is right but holds nothing to draw is `Ok` with an empty scene.
+/// [`LoadError::Read`] when the file itself cannot be read, [`LoadError::Input`] when its contents cannot be drawn.
+/// A valid file that holds nothing to draw is `Ok` with an empty scene.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let watch = Stopwatch::of_this_thread();
     let source = read_source(path, &options.limits)?;
@@ -252,9 +252,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     Ok(loaded)
 }
 
-/// Loads a model or scene from memory. Files it names are looked up beside `name`, which need not be there; for `-` in
-/// [`LoadOptions::root`]. A name without a folder stands for one in the current folder: where nothing is to be read but these
-/// bytes, the root is an empty folder and the name `-`. A zip archive holds all files of its model, and no others are read.
+/// Loads a model or scene from memory. Files it names are looked up beside `name`, which need not exist; for `-` in
+/// [`LoadOptions::root`]. A name without a folder stands for a file in the current folder: to read nothing but these
+/// bytes, use an empty folder as root and the name `-`. A zip archive holds all files of its model, and no others are read.
 pub fn load_bytes(name: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let mut loaded = load_source(&in_memory(name, bytes, &options.limits)?, options)?;
     check_wishes(&loaded, name, options)?;
@@ -262,7 +262,7 @@ pub fn load_bytes(name: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<
     Ok(loaded)
 }
 
-/// Refuses a scene or a variant that is asked for where a file has no such things.
+/// Refuses the choice of a scene or a variant where a file has none.
 fn check_wishes(loaded: &Loaded, file: &Path, options: &LoadOptions) -> Result<(), LoadError> {
     let refuse = |code, word: &str, wish: &Option<String>, names: &[String]| match wish {
         Some(name) if names.is_empty() => {
@@ -275,8 +275,8 @@ fn check_wishes(loaded: &Loaded, file: &Path, options: &LoadOptions) -> Result<(
     refuse("variant-none", "variant", &options.variant, &loaded.facts.variants)
 }
 
-/// A moment of what has no animations: refused when one is named, else a warning; and an animation that none of several
-/// models has. Parts of a whole are looked at together.
+/// Checks the chosen moment where a file has no animations: refused when one is named, else a warning. Also refuses an
+/// animation that none of several models has. Parts of a whole are checked together, by the caller.
 pub(crate) fn check_moment(loaded: &mut Loaded, file: &Path, options: &LoadOptions) -> Result<(), LoadError> {
     let Some(moment) = options.moment.as_ref().filter(|_| options.animations_before.is_none()) else { return Ok(()) };
     if !loaded.facts.animations.is_empty() {
@@ -303,7 +303,7 @@ fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadErr
     Ok(loaded)
 }
 
-/// Bytes that a scene takes once it is loaded.
+/// Bytes of memory of a loaded scene.
 fn kept(scene: &Scene) -> u64 {
     let pixels = |bitmap: &Bitmap| u64::from(bitmap.width) * u64::from(bitmap.height);
     let copies: u64 = scene.bitmaps.iter().map(|bitmap| texture::smaller_copies(pixels(bitmap))).sum();
@@ -311,7 +311,7 @@ fn kept(scene: &Scene) -> u64 {
     scene.bytes() + copies + around
 }
 
-/// Refuses a scene that shows more prims than there are numbers for: a small file can show a large mesh in many places.
+/// Refuses a scene with more prims than indices can address: a small file can instance a large mesh many times.
 pub(crate) fn check_prims(scene: &Scene, file: &Path) -> Result<(), LoadError> {
     let (shown, most) = (scene.prims(), Scene::MOST_PRIMS);
     if shown <= most {
@@ -325,7 +325,7 @@ pub(crate) fn check_prims(scene: &Scene, file: &Path) -> Result<(), LoadError> {
         .into())
 }
 
-/// Loads what is in memory already; whatever that takes comes out of one budget.
+/// Loads a source from memory; all allocations come out of one budget.
 fn load_within(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
     let too_large = |what: &str, over: OverBudget| {
         LoadError::from(Diagnostic::over_memory(&source.path, "", format!("{what} too large: {over}")))
@@ -347,14 +347,14 @@ fn load_within(source: &Source, options: &LoadOptions, budget: &mut Budget) -> R
             .map_err(|over| too_large("smooth normals are", over))?;
         tangents::generate_left(&mut loaded.scene);
     }
-    // Others have no transforms.
+    // Other formats have no transforms.
     if matches!(format, detect::Format::Gltf | detect::Format::SceneFile) {
         place::leave_out_far(&mut loaded, &source.path);
     }
     Ok(loaded)
 }
 
-/// What is in memory: a model or scene file, or an archive with a model.
+/// Wraps bytes in memory: a model or scene file, or an archive with a model.
 fn in_memory(name: &Path, bytes: Vec<u8>, limits: &Limits) -> Result<Source, LoadError> {
     if !archive::is_archive(name, &bytes) {
         return Ok(Source::new(name.into(), bytes));
@@ -365,7 +365,7 @@ fn in_memory(name: &Path, bytes: Vec<u8>, limits: &Limits) -> Result<Source, Loa
 
 /// Reads the model file itself, which may lie anywhere, or the only model of an archive.
 fn read_source(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
-    // What is no plain file, such as a pipe, is opened but once.
+    // Pipes and other special files must be opened only once.
     let archive = if path.is_file() { archive::opened(path) } else { Ok(None) };
     if let Some(archive) = archive.map_err(|error| archive::unreadable(error, path))? {
         return archive::only_model(archive, limits);
@@ -376,7 +376,7 @@ fn read_source(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
     }
 }
 
-/// Reads a file that may lie anywhere, in an archive, too, whatever it is.
+/// Reads a file of any kind, which may lie anywhere, also in an archive.
 fn read_file(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
     let fault = |error| archive::unreadable(error, path);
     let too_large = |bytes| LoadError::from(too_large(path, bytes, limits));
@@ -401,7 +401,7 @@ fn read_file(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
     Ok(Source::new(path.into(), bytes))
 }
 
-/// What is told of a model file that is larger than is allowed.
+/// Diagnostic for a model file that is larger than allowed.
 fn too_large(path: &Path, bytes: u64, limits: &Limits) -> Diagnostic {
     let text = format!("{bytes} bytes where {} are allowed", limits.file);
     Diagnostic::new("file-too-large", path, "", text).remedy(limits.remedy_for_file())

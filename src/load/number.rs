@@ -1,17 +1,17 @@
-//! Number words as exporters write them -> words that every number parser reads.
+//! Numbers in text: fast reading of plain ones, repair of the odd spellings that exporters write.
 
 use crate::load::Diagnostic;
 use crate::load::paths::shorten;
 use std::borrow::Cow;
 use std::path::Path;
 
-/// A number word, checked.
+/// A checked number word.
 pub(in crate::load) struct Number<'a> {
-    /// What to read.
+    /// Word that parses as a number.
     pub word: Cow<'a, str>,
-    /// Decimal places of the last digit (negative: it stands for tens, hundreds, …); `None` where there is none.
+    /// Decimal places of the last digit (negative: it stands for tens, hundreds, …); `None` where there is no digit.
     pub places: Option<i32>,
-    /// Whether the word had to be changed to be read.
+    /// Whether the word had to be repaired.
     pub odd: bool,
 }
 
@@ -21,7 +21,7 @@ pub(in crate::load) struct Plain {
     pub value: f64,
     /// Decimal places of the last digit, as in [`Number`].
     pub places: i32,
-    /// Bytes it takes.
+    /// Length in bytes.
     pub length: usize,
 }
 
@@ -31,13 +31,13 @@ const POWERS: [f64; 23] = [
     1e21, 1e22,
 ];
 
-/// Digits that surely fit into 64 bits.
+/// Largest number of digits that surely fits into 64 bits.
 const MOST_DIGITS: usize = 19;
 
 /// Reads the number that `text` starts with, if it ends before white space and can be read with one rounding: its digits
 /// make a whole number below 2⁵³ and its power of ten is exact, so that one division or multiplication gives what
-/// [`str::parse`] gives (W. D. Clinger, "How to Read Floating Point Numbers Accurately", 1990). What is not so plain is
-/// for [`check`].
+/// [`str::parse`] gives (W. D. Clinger, "How to Read Floating Point Numbers Accurately", 1990). Other numbers are left
+/// to [`check`].
 #[inline]
 pub(in crate::load) fn plain(text: &[u8]) -> Option<Plain> {
     let sign = usize::from(matches!(text.first(), Some(b'-' | b'+')));
@@ -72,7 +72,7 @@ pub(in crate::load) fn plain(text: &[u8]) -> Option<Plain> {
     Some(Plain { value, places: -(power as i32), length: at })
 }
 
-/// The digits from `at` on, put behind those of `number`, and where they end; more than fit wrap round.
+/// Appends the digits from `at` on to those of `number`; returns the result and the end of the digits. Overflow wraps.
 #[inline]
 fn digits(text: &[u8], mut at: usize, mut number: u64) -> (u64, usize) {
     while let Some(digit) = text.get(at).map(|b| b.wrapping_sub(b'0')).filter(|&d| d < 10) {
@@ -82,22 +82,22 @@ fn digits(text: &[u8], mut at: usize, mut number: u64) -> (u64, usize) {
     (number, at)
 }
 
-/// The number that a whole word is: as [`str::parse`] reads it, or one that is none as C libraries spell it.
+/// Value of a whole word: as [`str::parse`] reads it, or NaN for C libraries' spellings of non-finite numbers.
 pub(in crate::load) fn value(word: &[u8]) -> Option<f64> {
     let parsed = std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
     parsed.or_else(|| is_none_spelled(word).then_some(f64::NAN))
 }
 
-/// Numbers of a text that are spelled with a decimal comma or FORTRAN's `d`: read all the same, and told.
+/// Reads numbers spelled with a decimal comma or FORTRAN's `d`, and counts them for a warning.
 #[derive(Default)]
 pub(in crate::load) struct Respelled {
-    /// The first word, and its line.
+    /// The first such word, and its line.
     first: Option<(u32, String)>,
     count: u32,
 }
 
 impl Respelled {
-    /// The number that a whole word is: by [`value`], or once it is respelled.
+    /// Value of a whole word: by [`value`], or else after respelling.
     pub(in crate::load) fn value(&mut self, line: u32, word: &[u8]) -> Option<f64> {
         if let Some(value) = value(word) {
             return Some(value);
@@ -110,7 +110,7 @@ impl Respelled {
         Some(value)
     }
 
-    /// Tells of them, where there are any.
+    /// Warning about the respelled numbers, if any.
     pub(in crate::load) fn told(self, code: &'static str, file: &Path) -> Option<Diagnostic> {
         let (line, word) = self.first?;
         let text = format!("`{}` is read with a decimal point and `e`", shorten(&word));
@@ -119,19 +119,19 @@ impl Respelled {
     }
 }
 
-/// With decimal points for commas, `e` for FORTRAN's `d`, and signs behind it.
+/// Replaces commas by decimal points and FORTRAN's `d` by `e`, and moves signs behind the `e`.
 fn respelled(lower: &str) -> String {
     lower.replace(',', ".").replace('d', "e").replace("+e", "e+").replace("-e", "e-")
 }
 
-/// Whether a word is `nan`, `inf` or what C libraries print for them: `-nan(ind)`, `1.#QNAN`.
+/// Whether a word is `nan`, `inf` or a spelling of C libraries for them: `-nan(ind)`, `1.#QNAN`.
 fn is_none_spelled(word: &[u8]) -> bool {
     let text = String::from_utf8_lossy(word).to_ascii_lowercase();
     let unsigned = text.trim_start_matches(['+', '-']);
     ["nan", "inf", "1.#", "ind"].iter().any(|start| unsigned.starts_with(start))
 }
 
-/// Checks a word; one that is no number in any reading becomes `nan`.
+/// Checks a word; one that cannot be read as a number becomes `nan`.
 pub(super) fn check(word: &[u8]) -> Number<'_> {
     if let Some((end, places)) = scan(word)
         && end == word.len()
@@ -142,7 +142,7 @@ pub(super) fn check(word: &[u8]) -> Number<'_> {
     repair(word)
 }
 
-/// Length and decimal places of the longest number `word` starts with.
+/// Length and decimal places of the longest number that `word` starts with.
 fn scan(word: &[u8]) -> Option<(usize, i32)> {
     let digits = |from: usize| word[from..].iter().take_while(|b| b.is_ascii_digit()).count();
     let mut at = usize::from(matches!(word.first(), Some(b'+' | b'-')));
@@ -170,8 +170,8 @@ fn scan(word: &[u8]) -> Option<(usize, i32)> {
     Some((at, places))
 }
 
-/// Reads `nan`, `inf`, C runtime spellings (`1.#IND`), decimal commas, Fortran exponents, a sign before the exponent's
-/// letter, and numbers followed by something else.
+/// Repairs `nan`, `inf`, C runtime spellings (`1.#IND`), decimal commas, Fortran exponents, a sign before the exponent's
+/// letter, and numbers followed by other characters.
 fn repair(word: &[u8]) -> Number<'_> {
     let odd = |word: String| Number { word: word.into(), places: None, odd: true };
     let text = String::from_utf8_lossy(word).to_ascii_lowercase();

@@ -1,4 +1,4 @@
-//! Pictures of surroundings: Radiance HDR, OpenEXR, and 8- or 16-bit pictures, whose colours are sRGB and which cameras turn.
+//! Panoramas of surroundings: Radiance HDR, OpenEXR, and 8- or 16-bit pictures, decoded from sRGB and turned upright by EXIF.
 
 use super::diagnostic::CUT_OFF;
 use super::limits::{Budget, Limits};
@@ -23,26 +23,26 @@ use std::path::Path;
 use std::sync::Arc;
 use xxhash_rust::xxh3::xxh3_128;
 
-/// A panorama and what was found out on the way.
+/// A loaded panorama.
 #[derive(Clone, Debug)]
 pub struct LoadedPanorama {
     /// The picture.
     pub panorama: Panorama,
-    /// What is odd about it.
+    /// Warnings about its contents.
     pub warnings: Vec<Diagnostic>,
-    /// xxh3-128 of the file.
+    /// xxh3-128 of the file's bytes.
     pub hash: u128,
 }
 
-/// Bytes that a pixel takes while it is decoded, turned into radiance, and copied at all sizes.
+/// Bytes that a pixel takes while it is decoded, converted to radiance, and copied at all sizes.
 pub(crate) const PER_PIXEL: u64 = 48;
 
-/// Loads an equirectangular picture. Colours of HDR files are taken as linear Rec. 709, and those of EXR files become that from
-/// whatever primaries they have; what Rec. 709 cannot show loses the part that would be less than no light.
+/// Loads an equirectangular picture. Colours of HDR files are taken as linear Rec. 709, those of EXR files are converted
+/// from their primaries; negative parts of colours outside of the gamut of Rec. 709 are clamped to 0.
 ///
 /// # Errors
-/// [`LoadError::Read`] when the file cannot be read, [`LoadError::Input`] when it is no such picture or larger than
-/// `limits` allow.
+/// [`LoadError::Read`] when the file cannot be read, [`LoadError::Input`] when it is not a picture of a supported kind or larger
+/// than `limits` allow.
 pub fn load(path: &Path, limits: &Limits) -> Result<LoadedPanorama, LoadError> {
     decode(&super::read_file(path, limits)?, limits)
 }
@@ -68,13 +68,13 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
     let luminance = meta.as_ref().and_then(of_luminance);
     let size = luminance.map_or_else(|| reader(limits.memory).into_dimensions(), |part| Ok(size_of(part)));
     let size = size.map_err(|e| fault(format!("cannot be decoded: {e}")))?;
-    // An EXR file is decoded as large as it says that its data are, whatever part of them is shown.
+    // All pixels of an EXR's data window are decoded, whatever part of them is shown.
     for part in meta.iter().flat_map(|meta| &meta.headers) {
         memory_of(size_of(part), limits, &source.path, fault)?;
     }
     let most = memory_of(size, limits, &source.path, fault)?;
     let decode = || if luminance.is_some() { grey(bytes) } else { upright(reader(most)) };
-    // The decoder of EXR files gives up on some damaged ones by a panic.
+    // The EXR decoder panics on some damaged files.
     let picture = match attempt(|| threads::anywhere(decode)) {
         Some(Ok(picture)) => picture,
         Some(Err(ImageError::IoError(why))) if why.kind() == ErrorKind::UnexpectedEof => {
@@ -106,10 +106,10 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
     Ok(LoadedPanorama { panorama, warnings, hash: xxh3_128(&source.bytes) })
 }
 
-/// Bytes that a panorama of so many columns and rows may take while it is loaded.
+/// Bytes that a panorama of this size may take while it is loaded.
 ///
 /// # Errors
-/// Where it has no pixels, or more than `limits` allow, of which memory is told apart; what else is wrong is a `fault`.
+/// Where it has no pixels (by `fault`), or more than `limits` allow; a lack of memory has a code of its own.
 fn memory_of(
     (width, height): (u32, u32),
     limits: &Limits,
@@ -119,7 +119,7 @@ fn memory_of(
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 || pixels > limits.image_pixels {
         let text = format!("is {width}×{height} pixels where 1 to {} are allowed", limits.image_pixels);
-        // Less memory allows less pixels.
+        // The limit of pixels shrinks with the memory.
         let fits = (1..=Limits::default().image_pixels).contains(&pixels);
         let too_large = |text| Diagnostic::new("env-unusable", path, "", text).remedy("scale it down").into();
         return Err(match pixels {
@@ -134,7 +134,7 @@ fn memory_of(
     Ok(pixels * PER_PIXEL)
 }
 
-/// Warnings of all but one of so many parts, and of pixels that are taken as 0.
+/// Warnings that only one of `parts` parts is shown, and that `odd` pixels are taken as 0.
 fn left_out(path: &Path, parts: usize, odd: usize) -> Vec<Diagnostic> {
     let mut warnings = Vec::new();
     if parts > 1 {
@@ -149,10 +149,10 @@ fn left_out(path: &Path, parts: usize, odd: usize) -> Vec<Diagnostic> {
     warnings
 }
 
-/// A Radiance picture as its decoder knows it: the first line of one names the program that wrote it, mostly `#?RADIANCE` or
-/// `#?RGBE`. Others as they are.
+/// Radiance picture with the first line that its decoder expects: files name the program that wrote them there, mostly
+/// `#?RADIANCE` or `#?RGBE`. Other files are returned unchanged.
 fn as_radiance(bytes: &[u8]) -> Cow<'_, [u8]> {
-    /// The longest such line.
+    /// Longest first line.
     const LINE: usize = 80;
     let end = bytes.iter().take(LINE).position(|&byte| byte == b'\n');
     match end {
@@ -163,7 +163,7 @@ fn as_radiance(bytes: &[u8]) -> Cow<'_, [u8]> {
     }
 }
 
-/// A picture as it is looked at: cameras note how they were held.
+/// Decodes a picture upright: cameras record how they were held.
 fn upright(reader: ImageReader<Cursor<&[u8]>>) -> ImageResult<DynamicImage> {
     let mut decoder = reader.into_decoder()?;
     let orientation = decoder.orientation()?;
@@ -172,20 +172,20 @@ fn upright(reader: ImageReader<Cursor<&[u8]>>) -> ImageResult<DynamicImage> {
     Ok(picture)
 }
 
-/// The first part of an EXR file, if it has luminance instead of colours, which the usual decoder refuses.
+/// Header of the first part of an EXR, if it has luminance instead of colours, which the usual decoder refuses.
 fn of_luminance(meta: &MetaData) -> Option<&Header> {
     let part = meta.headers.first()?;
     let has = |name: &str| part.channels.find_index_of_channel(&name.into()).is_some();
     (has("Y") && !["R", "G", "B"].into_iter().any(has)).then_some(part)
 }
 
-/// Pixels across and down.
+/// Columns and rows of the data.
 fn size_of(part: &Header) -> (u32, u32) {
     let pixels = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     (pixels(part.layer_size.width()), pixels(part.layer_size.height()))
 }
 
-/// The luminance of an EXR file, for all three channels.
+/// Luminance of an EXR file, copied to all three channels.
 fn grey(bytes: &[u8]) -> ImageResult<DynamicImage> {
     let blank = |size: ::exr::math::Vec2<usize>, _: &_| Rgb32FImage::new(size.width() as u32, size.height() as u32);
     let set = |picture: &mut Rgb32FImage, at: ::exr::math::Vec2<usize>, (y,): (f32,)| {
@@ -197,7 +197,7 @@ fn grey(bytes: &[u8]) -> ImageResult<DynamicImage> {
     Ok(DynamicImage::ImageRgb32F(read.map_err(decoding)?.layer_data.channel_data.pixels))
 }
 
-/// What turns the colours of an EXR file into Rec. 709; `None`: they are that, or nobody knows, which is told.
+/// Matrix from the colours of an EXR file to Rec. 709; `None` where they are Rec. 709, or invalid, which costs a warning.
 fn other_colors(meta: &MetaData, file: &Path, warnings: &mut Vec<Diagnostic>) -> Option<DMat3> {
     let said = meta.headers.first()?.shared_attributes.chromaticities?;
     let primaries = Primaries::of([said.red, said.green, said.blue, said.white].map(|at| [at.x(), at.y()]));
@@ -218,14 +218,14 @@ fn in_rec_709(turned: DMat3, texel: [f32; 3]) -> [f32; 3] {
     color.to_array().map(|c| (c as f32).min(f32::MAX))
 }
 
-/// What the numbers of a Radiance picture have been multiplied by, if that is known and not 1.
+/// Factor that the values of a Radiance picture have been multiplied by, if known and not 1.
 fn exposure(bytes: &[u8]) -> Option<f32> {
     let exposure = HdrDecoder::new(Cursor::new(bytes)).ok()?.metadata().exposure?;
     Some(exposure).filter(|e| e.is_finite() && *e > 0.0 && *e != 1.0)
 }
 
-/// Linear radiance of all pixels, `turned` into Rec. 709, and how many of them had to be mended. What is negative in other
-/// primaries need not be so in these.
+/// Linear radiance of all pixels, converted to Rec. 709 by `turned`, and the number of pixels that had to be repaired. Values
+/// negative in other primaries need not be so in Rec. 709.
 fn radiance(picture: DynamicImage, format: ImageFormat, turned: Option<DMat3>) -> (Vec<[f32; 3]>, usize) {
     if !matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
         return (linear(picture), 0);
@@ -245,7 +245,7 @@ fn radiance(picture: DynamicImage, format: ImageFormat, turned: Option<DMat3>) -
 
 /// Linear colours of a picture for screens.
 fn linear(picture: DynamicImage) -> Vec<[f32; 3]> {
-    /// The colour of each of so many codes.
+    /// Linear value of every code up to `most`.
     fn table(most: u16) -> Vec<f32> {
         (0..=most).map(|code| from_srgb([f32::from(code) / f32::from(most); 3]).x).collect()
     }
@@ -271,12 +271,12 @@ fn linear(picture: DynamicImage) -> Vec<[f32; 3]> {
 
 #[cfg(feature = "cli")]
 impl LoadedPanorama {
-    /// Bytes that it takes, with what a picture makes of it.
+    /// Bytes of the panorama and its copies for rendering.
     pub(crate) fn bytes(&self) -> u64 {
         self.panorama.texels.len() as u64 * PER_PIXEL
     }
 
-    /// Whether its pixels fit within these limits.
+    /// Whether the panorama fits within `limits`.
     pub(crate) fn fits(&self, limits: &Limits) -> bool {
         let Panorama { width, height, .. } = self.panorama;
         memory_of((width, height), limits, Path::new(""), |_| LoadError::Input(Vec::new())).is_ok()
@@ -353,12 +353,12 @@ mod tests {
         }
     }
 
-    /// An EXR of even colour in other primaries, once in each part.
+    /// Builds an EXR of one colour in other primaries, repeated in each part.
     fn exr(colors: [[f32; 2]; 3], [r, g, b]: [f32; 3], parts: usize) -> Source {
         exr_of(colors, &[("R", r), ("G", g), ("B", b)], parts)
     }
 
-    /// An EXR file of one or several parts with channels of these names.
+    /// Builds an EXR of one or several parts with the given channels.
     fn exr_of(colors: [[f32; 2]; 3], channels: &[(&str, f32)], parts: usize) -> Source {
         use ::exr::prelude::*;
         let layer = |i: usize| {
@@ -480,7 +480,7 @@ mod tests {
     #[test]
     fn an_exr_is_as_large_as_its_data_whatever_part_of_them_it_shows() {
         let mut source = exr([[0.64, 0.33], [0.3, 0.6], [0.15, 0.06]], [1.0; 3], 1);
-        // The last column of the data window: a name, a type and a size come before two times two whole numbers.
+        // The last column of the data window: behind a name, a type and a size come two pairs of integers.
         let name = b"dataWindow\0box2i\0";
         let at = source.bytes.windows(name.len()).position(|bytes| bytes == name).unwrap() + name.len() + 4 + 8;
         assert_eq!(source.bytes[at..at + 4], 3i32.to_le_bytes());

@@ -1,4 +1,4 @@
-//! Coordinates in `f64` -> a centre in `f64` and coordinates around it in `f32`.
+//! Coordinates in `f64` -> a centre in `f64` and `f32` coordinates relative to it.
 
 use super::{Diagnostic, Loaded, Warnings};
 use crate::math::frame::{center_of_most, spread};
@@ -13,23 +13,23 @@ use std::path::Path;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Placed {
     pub center: DVec3,
-    /// Not finite where the file's are not, or are too large.
+    /// Rounded positions; not finite where those of the file are not, or are too large.
     pub positions: Vec<Vec3>,
     /// Largest distance between a position and its rounded one.
     pub max_rounding: f64,
 }
 
-/// Whether a place or size is finite and not so large that it counts as infinite.
+/// Whether a position or size is finite and not so large that it counts as infinite.
 pub(super) fn is_usable(p: DVec3) -> bool {
     p.is_finite() && p.abs().max_element() <= Scene::LARGEST
 }
 
-/// Leaves out instances of which any part is placed where coordinates count as infinite.
+/// Removes instances of which any part is placed where coordinates count as infinite.
 pub(super) fn leave_out_far(loaded: &mut Loaded, file: &Path) {
     let meshes = &loaded.scene.meshes;
     let boxes: Vec<OnceCell<ObjectBox>> = vec![OnceCell::new(); meshes.len()];
     let is_near = |instance: &Instance| {
-        // What is neither moved nor made larger by its transform need not be measured: each coordinate was looked at.
+        // A transform that neither moves nor enlarges needs no measuring: every coordinate was checked before.
         let (matrix, mesh) = (instance.world_from_object.matrix3, instance.mesh as usize);
         let largest = matrix.transpose().to_cols_array_2d().map(|row| row.iter().map(|x| x.abs()).sum::<f64>());
         let is_no_larger = largest.iter().all(|&times| times <= 1.0);
@@ -47,7 +47,7 @@ pub(super) fn leave_out_far(loaded: &mut Loaded, file: &Path) {
     loaded.warnings.push(Diagnostic { count: u32::try_from(count).unwrap_or(u32::MAX), ..warning });
 }
 
-/// Why a shape cannot be placed.
+/// Why a shape was left out.
 pub(super) struct LeftOut {
     code: &'static str,
     reason: &'static str,
@@ -55,21 +55,21 @@ pub(super) struct LeftOut {
 }
 
 impl LeftOut {
-    /// It lies where coordinates count as infinite.
+    /// The shape lies where coordinates count as infinite.
     pub(super) const TOO_FAR: Self = Self {
         code: "shape-too-far",
         reason: "a coordinate over 1e18",
         text: "a shape is left out: a coordinate or size is over 1e18",
     };
 
-    /// Rounding leaves nothing of it.
+    /// The shape is degenerate once its coordinates are rounded.
     pub(super) const COLLAPSED: Self = Self {
         code: "face-degenerate",
         reason: "two corners in one place",
         text: "a triangle is left out: two corners are in one place once coordinates are rounded",
     };
 
-    /// Tells of so many, where there are any; the first is at that place of the file.
+    /// Reports `count` shapes as dropped, if any; `file` and `place` are those of the first.
     pub(super) fn tell(
         &self,
         count: u64,
@@ -85,7 +85,7 @@ impl LeftOut {
     }
 }
 
-/// Positions that one thread looks at at a time.
+/// Number of positions per parallel task.
 const POSITIONS: usize = 1 << 13;
 
 /// Subtracts the centre of all finite positions in `f64`, or of most of them where a few are far away, then rounds.
@@ -95,12 +95,12 @@ pub(super) fn place(positions: &[DVec3]) -> Placed {
     place_around(positions, center_of_most(lo, hi, sample))
 }
 
-/// Least and greatest coordinates of all finite positions; infinite the wrong way round where there are none.
+/// Bounds of all finite positions; an inverted infinite box where there are none.
 pub(super) fn bounds(positions: &[DVec3]) -> (DVec3, DVec3) {
     bounds_of(positions.par_iter().map(|&p| if is_usable(p) { p } else { DVec3::NAN }))
 }
 
-/// The corners of the box around places.
+/// Bounds of positions.
 pub(super) fn bounds_of(places: impl IndexedParallelIterator<Item = DVec3>) -> (DVec3, DVec3) {
     let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let both = |(lo, hi): (DVec3, DVec3), (low, high): (DVec3, DVec3)| (lo.min(low), hi.max(high));
@@ -108,7 +108,7 @@ pub(super) fn bounds_of(places: impl IndexedParallelIterator<Item = DVec3>) -> (
     places.with_min_len(POSITIONS).fold(nothing, with).reduce(nothing, both)
 }
 
-/// Subtracts this centre in `f64`, then rounds.
+/// Subtracts `center` in `f64`, then rounds.
 pub(super) fn place_around(positions: &[DVec3], center: DVec3) -> Placed {
     let mut rounded = vec![Vec3::NAN; positions.len()];
     let round = |(to, from): (&mut [Vec3], &[DVec3])| {
@@ -125,8 +125,8 @@ pub(super) fn place_around(positions: &[DVec3], center: DVec3) -> Placed {
     Placed { center, positions: rounded, max_rounding }
 }
 
-/// Leaves out triangles with two corners in one place, as coordinates are rounded; how many. Of each triangle the mesh
-/// says which face it was cut from.
+/// Removes triangles with two corners at one position after rounding; returns their number. The mesh holds the face that each
+/// triangle was cut from.
 pub(super) fn leave_out_collapsed(mesh: &mut Mesh) -> u64 {
     let place = |corner: u32| mesh.positions[corner as usize];
     let is_wide = |[a, b, c]: &[u32; 3]| place(*a) != place(*b) && place(*b) != place(*c) && place(*c) != place(*a);

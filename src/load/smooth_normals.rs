@@ -1,9 +1,9 @@
-//! Smooth normals for meshes that have none, where their owner asks for them: scans and solids from printers are flat
-//! faces to the letter, and something round to everybody who looks at them.
+//! Smooth normals for meshes without normals, on request: scans and printed solids consist of flat faces, but are meant to
+//! look round.
 //!
 //! The normal of a corner is the sum of the normals of those faces around its vertex that lean against its own face by no
 //! more than an angle, each weighted by its own angle there (G. Thürmer and C. A. Wüthrich, "Computing Vertex Normals from
-//! Polygonal Facets", 1998). Vertices count as one where they are at the same place, in all meshes that stand together, so
+//! Polygonal Facets", 1998). Vertices at the same position count as one, across all meshes that stand together, so
 //! that neither a format that repeats them nor a change of material makes a seam.
 
 use super::limits::{Budget, OverBudget};
@@ -13,11 +13,11 @@ use crate::scene::{Mesh, Reflection, Scene};
 use std::collections::HashMap;
 use std::mem::size_of;
 
-/// Faces at one place from which on all of them stay flat there: each is compared with each other.
+/// Number of faces at one position beyond which they stay flat there: every face is compared with every other.
 const MOST_AROUND: usize = 512;
 
-/// Gives all meshes without normals smooth ones, but for edges at which faces lean by more than `most`, radians. Those that
-/// no light changes need none.
+/// Gives all meshes without normals smooth ones, except at edges where faces lean by more than `most`, in radians. Unlit
+/// meshes need none.
 ///
 /// # Errors
 /// When that takes more memory than is left of `budget`.
@@ -27,7 +27,7 @@ pub(super) fn smooth(scene: &mut Scene, most: f64, budget: &mut Budget) -> Resul
         |mesh: &Mesh| materials.get(mesh.material as usize).is_some_and(|m| matches!(m.reflection, Reflection::Unlit));
     let flat = |mesh: &Mesh| mesh.normals.is_empty() && mesh.corners() > 0 && !is_unlit(mesh);
     let corners: usize = scene.meshes.iter().filter(|&mesh| flat(mesh)).map(Mesh::corners).sum();
-    // A corner, its place in a table and the vertex it may become.
+    // Per corner: the corner, its entry in a table and the vertex it may become.
     let vertex = 2 * size_of::<Vec3>() + 4 * size_of::<Vec3>() + size_of::<Corner>() + size_of::<([u32; 3], u32)>();
     budget.take(corners as u64, vertex as u64)?;
     let groups = standing_together(scene, flat);
@@ -44,7 +44,7 @@ pub(super) fn smooth(scene: &mut Scene, most: f64, budget: &mut Budget) -> Resul
     Ok(())
 }
 
-/// The numbers of meshes whose instances stand at the same places, for those that are `wanted`.
+/// Groups the indices of the `wanted` meshes by equal placements of their instances.
 fn standing_together(scene: &Scene, wanted: impl Fn(&Mesh) -> bool) -> Vec<Vec<usize>> {
     let mut places: Vec<Vec<[u64; 12]>> = vec![Vec::new(); scene.meshes.len()];
     for instance in &scene.instances {
@@ -65,24 +65,24 @@ fn standing_together(scene: &Scene, wanted: impl Fn(&Mesh) -> bool) -> Vec<Vec<u
     groups
 }
 
-/// Angle at corner i of a polygon, radians; 0 where it has none.
+/// Angle at corner i of a polygon, radians; 0 where it is undefined.
 pub(super) fn angle(ring: &[DVec3], i: usize) -> f64 {
     let n = ring.len();
     let (a, b) = (ring[(i + n - 1) % n] - ring[i], ring[(i + 1) % n] - ring[i]);
     libm::atan2(a.cross(b).length(), a.dot(b))
 }
 
-/// A corner of a face, as others see it that meet it.
+/// A corner of a face, as the other faces at its position see it.
 struct Corner {
-    /// Unit normal of its face; zero without area.
+    /// Unit normal of the face; zero for a face without area.
     normal: DVec3,
-    /// Angle of the face here, radians.
+    /// Angle of the face at the corner, radians.
     angle: f64,
-    /// The number of its place.
+    /// Index of the corner's position.
     place: u32,
 }
 
-/// A normal for each corner of all these meshes in turn; zero where there is none.
+/// Normals of all corners of these meshes in turn; zero where there is none.
 fn normals(group: &[usize], meshes: &[Mesh], least_cosine: f64) -> Vec<Vec3> {
     let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
     let (mut corners, mut ring) = (Vec::new(), Vec::new());
@@ -92,7 +92,7 @@ fn normals(group: &[usize], meshes: &[Mesh], least_cosine: f64) -> Vec<Vec3> {
             ring.extend(face.iter().map(|&vertex| mesh.positions[vertex as usize].as_dvec3()));
             let normal = newell(&ring).normalize_or_zero();
             for (i, &vertex) in face.iter().enumerate() {
-                // Both zeros are one place.
+                // +0 and −0 are one position.
                 let key = mesh.positions[vertex as usize].to_array().map(|c| (c + 0.0).to_bits());
                 #[expect(clippy::cast_possible_truncation, reason = "loading refuses 2^32 corners")]
                 let new = numbers.len() as u32;
@@ -101,7 +101,7 @@ fn normals(group: &[usize], meshes: &[Mesh], least_cosine: f64) -> Vec<Vec3> {
         });
     }
 
-    // The corners at each place, one after the other.
+    // Bucket the corners by position.
     let mut ends = vec![0_u32; numbers.len() + 1];
     corners.iter().for_each(|corner| ends[corner.place as usize + 1] += 1);
     (1..ends.len()).for_each(|i| ends[i] += ends[i - 1]);
@@ -119,14 +119,14 @@ fn normals(group: &[usize], meshes: &[Mesh], least_cosine: f64) -> Vec<Vec3> {
             return corner.normal.as_vec3();
         }
         let around = at_place[from..to].iter().map(|&i| &corners[i as usize]);
-        // A hair of slack, so that faces in one plane are always taken together.
+        // With some slack, so that coplanar faces are always joined.
         let meets = around.filter(|other| other.normal.dot(corner.normal) >= least_cosine - 1e-9);
         meets.map(|other| other.normal * other.angle).sum::<DVec3>().normalize_or(corner.normal).as_vec3()
     };
     corners.iter().map(smooth).collect()
 }
 
-/// Puts the normals of its corners into a mesh: a vertex for each normal that is asked of it.
+/// Sets the normals of a mesh from those of its corners: a vertex is copied for each different normal.
 fn give(mesh: &mut Mesh, normals: &[Vec3]) {
     let mut numbers: HashMap<(u32, [u32; 3]), u32> = HashMap::new();
     let (mut from, mut given) = (Vec::new(), Vec::new());

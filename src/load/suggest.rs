@@ -1,4 +1,4 @@
-//! What the user may have meant.
+//! Suggestions for mistyped names.
 
 /// The most similar of `known` to `typed`, if it is similar at all.
 pub fn nearest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -7,7 +7,7 @@ pub fn nearest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
     (best.0 > 0.75).then_some(best.1)
 }
 
-/// `a, b, c`, at most 12 of them.
+/// Formats `a, b, c`, at most 12 names.
 pub fn list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.into_iter().collect();
     let shown = names.iter().take(12).map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");

@@ -1,4 +1,4 @@
-//! Tangents for normal maps where a file has none: MikkTSpace, as glTF asks for and baking tools use.
+//! Tangents for normal maps where a file has none: MikkTSpace, as glTF requires and baking tools use.
 //!
 //! M. S. Mikkelsen, *Simulation of Wrinkled Surfaces Revisited*, 2008.
 
@@ -8,13 +8,13 @@ use bevy_mikktspace::{Geometry, Ops, TangentSpace};
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-/// Bytes that generating takes a corner: what is noted of it, beside the vertex of its own that it may become.
+/// Bytes that generating takes per corner: working data, and the vertex of its own that the corner may become.
 pub const OF_CORNER: u64 = 256;
 
-/// Gives `mesh` tangents along texture coordinates, which it notes.
+/// Generates tangents of `mesh` along texture coordinates, and records in the mesh which.
 ///
-/// Vertices whose corners need different tangents are split; a mesh without normals gets flat ones, vertex by vertex.
-/// Leaves the mesh as it is when it has no such coordinates, or polygons instead of triangles.
+/// Vertices whose corners need different tangents are split; a mesh without normals gets flat ones, one vertex per corner.
+/// Leaves the mesh unchanged when it lacks these coordinates, or has polygons instead of triangles.
 pub fn generate(mesh: &mut Mesh, along: TexCoords) {
     let set = along.set as usize;
     let known = mesh.uvs.get(set).is_some_and(|uvs| uvs.len() == mesh.positions.len());
@@ -38,8 +38,8 @@ pub fn generate(mesh: &mut Mesh, along: TexCoords) {
     mesh.tangents_along = Some(along);
 }
 
-/// The coordinates as their transform turns them, and along which that makes tangents: along those of the file where it
-/// leaves nothing of them.
+/// Texture coordinates after their transform, and the coordinates that tangents then follow: those of the file where the
+/// transform is degenerate.
 fn transformed(along: TexCoords, uvs: &[Vec2]) -> (TexCoords, Cow<'_, [Vec2]>) {
     let [x_axis, y_axis] = along.transform.axes();
     let area = x_axis.perp_dot(y_axis);
@@ -49,7 +49,7 @@ fn transformed(along: TexCoords, uvs: &[Vec2]) -> (TexCoords, Cow<'_, [Vec2]>) {
     (along, uvs.iter().map(|uv| x_axis * uv.x + y_axis * uv.y).collect())
 }
 
-/// Gives meshes their tangents that were left without until their normals are smooth: those that note coordinates and have none.
+/// Generates the tangents of meshes that were postponed until normals are smooth: those with recorded coordinates and none.
 pub fn generate_left(scene: &mut Scene) {
     for mesh in scene.meshes.iter_mut().filter(|mesh| mesh.tangents.is_empty()) {
         if let Some(along) = mesh.tangents_along.take() {
@@ -58,12 +58,12 @@ pub fn generate_left(scene: &mut Scene) {
     }
 }
 
-/// Faces that the generator takes, and those around a vertex where too many meet for it.
+/// Faces for the generator, and faces around a vertex where too many meet for it.
 ///
-/// The generator goes around a vertex by recursion and compares every face there with every other. It takes vertices
-/// for one when they are equal in all that it sees.
+/// The generator visits the faces around a vertex by recursion and compares each with every other. It merges vertices
+/// with equal position, normal and coordinates.
 fn sort_out(mesh: &Mesh, uvs: &[Vec2]) -> (Vec<u32>, Vec<u32>) {
-    /// Far more than meet at the tip of a finely turned cone.
+    /// Far more faces than meet at the tip of a finely turned cone.
     const CROWD: u32 = 1000;
     let all = 0..mesh.triangles.len() as u32;
     if mesh.triangles.len() as u64 <= u64::from(CROWD) {
@@ -73,7 +73,7 @@ fn sort_out(mesh: &Mesh, uvs: &[Vec2]) -> (Vec<u32>, Vec<u32>) {
     mesh.triangles.iter().flatten().for_each(|&vertex| faces_of[vertex as usize] += 1);
     let seen = |vertex: usize| {
         let ([x, y, z], [nx, ny, nz]) = (mesh.positions[vertex].to_array(), mesh.normals[vertex].to_array());
-        // Zeros of both signs are equal.
+        // +0 and −0 are equal.
         [x, y, z, nx, ny, nz, uvs[vertex].x, uvs[vertex].y].map(|value| (value + 0.0).to_bits())
     };
     let mut faces_at: HashMap<[u32; 8], u32> = HashMap::with_capacity(mesh.positions.len());
@@ -87,10 +87,10 @@ fn sort_out(mesh: &Mesh, uvs: &[Vec2]) -> (Vec<u32>, Vec<u32>) {
     all.partition(|&face| mesh.triangles[face as usize].iter().all(is_calm))
 }
 
-/// The tangent of one face by itself, as the generator would begin with.
+/// Tangent of a single face, which the generator would start from.
 fn of_face(triangle: [u32; 3], mesh: &Mesh, uvs: &[Vec2]) -> Vec4 {
     let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize]);
-    // Green of a normal map points up, where v points down.
+    // Green of a normal map points up, v points down.
     let [u, v, w] = triangle.map(|vertex| Vec2::new(1.0, -1.0) * uvs[vertex as usize]);
     let (along, across) = (v - u, w - u);
     let area = along.perp_dot(across);
@@ -98,11 +98,11 @@ fn of_face(triangle: [u32; 3], mesh: &Mesh, uvs: &[Vec2]) -> Vec4 {
     direction.try_normalize().unwrap_or(Vec3::X).extend(if area < 0.0 { -1.0 } else { 1.0 })
 }
 
-/// What the generator sees.
+/// The mesh as the generator sees it.
 struct View<'a> {
     mesh: &'a Mesh,
     uvs: &'a [Vec2],
-    /// The faces that it is given.
+    /// Faces for the generator.
     faces: &'a [u32],
     corners: &'a mut [[Vec4; 3]],
 }
@@ -144,7 +144,7 @@ impl Geometry<LibmOps> for View<'_> {
     }
 
     fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
-        // Green of a normal map points up, where v points down.
+        // Green of a normal map points up, v points down.
         let uv = self.uvs[self.vertex(face, corner)];
         [uv.x, 1.0 - uv.y]
     }
@@ -152,7 +152,7 @@ impl Geometry<LibmOps> for View<'_> {
     fn set_tangent(&mut self, tangent: Option<TangentSpace>, face: usize, corner: usize) {
         let Some(tangent) = tangent else { return };
         let tangent = Vec4::from(tangent.tangent_encoded());
-        // Where coordinates do not vary there is no direction; any one will do.
+        // Where coordinates do not vary there is no direction; any tangent will do.
         if tangent.is_finite() && tangent.truncate().length_squared() > 0.0 {
             self.corners[self.faces[face] as usize][corner] = tangent;
         }
@@ -175,7 +175,7 @@ fn flatten(mesh: &mut Mesh) {
     mesh.normals = mesh.positions.chunks_exact(3).flat_map(flat).collect();
 }
 
-/// Turns tangents of corners into tangents of vertices.
+/// Converts tangents of corners to tangents of vertices, splitting vertices where they differ.
 fn split(mesh: &mut Mesh, corners: &[[Vec4; 3]]) {
     mesh.tangents = vec![Vec4::ZERO; mesh.positions.len()];
     let mut copies: HashMap<(u32, [u32; 4]), u32> = HashMap::new();
@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn mirrored_coordinates_split_the_seam() {
         let mut mesh = Mesh { normals: vec![Vec3::Z; 4], ..square() };
-        // The second triangle runs u the other way.
+        // The second triangle is mirrored in u.
         mesh.uvs[0][3] = Vec2::new(2.0, 0.0);
         generate(&mut mesh, TexCoords::default());
         assert_eq!(mesh.positions.len(), 6);

@@ -1,8 +1,8 @@
 //! Encoded pictures -> [`Bitmap`]s, for every loader.
 //!
-//! The kind of picture is found by its bytes, whatever its name or declared type says, but for TGA, whose bytes say
-//! little. Colour profiles, gamma chunks and EXIF orientation are ignored, as glTF demands. A picture that is missing or
-//! broken costs a warning, and the material goes on without that map; a JPEG that was cut off is told of, and used.
+//! The kind of a picture is detected by its bytes, whatever its name or declared type, except for TGA, which has no magic
+//! bytes. Colour profiles, gamma chunks and EXIF orientation are ignored, as glTF demands. A picture that is missing or
+//! broken costs a warning, and the material goes without that map; a truncated JPEG costs a warning, and is used.
 
 use super::diagnostic::{CUT_OFF, RAISE_MEMORY};
 use super::limits::{Budget, Limits};
@@ -22,16 +22,16 @@ use std::time::Instant;
 /// A picture to decode.
 #[derive(Debug, Default)]
 pub struct Encoded<'a> {
-    /// Its name in messages and in the [`Bitmap`].
+    /// Name in messages and in the [`Bitmap`].
     pub name: String,
-    /// Where the model names it (line or JSON path).
+    /// Where the model names the picture (line or JSON path).
     pub place: String,
     /// The file's bytes.
     pub bytes: std::borrow::Cow<'a, [u8]>,
 }
 
-/// Decodes all, in parallel; `None` for each that could not be, with a warning about `file`, as there is about one that was cut
-/// off. And the time that took, of all threads together.
+/// Decodes all pictures in parallel; `None` for each that failed. Warnings about `file` report those, and truncated ones. Also
+/// returns the time spent, of all threads together.
 ///
 /// Sizes are checked against `limits` and `budget` before anything is decoded.
 pub fn decode_all(
@@ -47,7 +47,7 @@ pub fn decode_all(
     let start = Instant::now();
     let sized = images.iter().map(|image| (image, check_size(image, limits, budget)));
     let mut waiting: Vec<_> = sized.enumerate().collect();
-    // The longest first: whoever is done takes the next, and none is left alone with a long one in the end.
+    // The largest files first, so that no thread is left alone with a long one at the end.
     waiting.sort_by_key(|(_, (image, _))| Reverse(image.bytes.len()));
     let decoded = waiting.into_iter().par_bridge().map(|(i, (image, kind))| {
         let watch = Stopwatch::of_this_thread();
@@ -69,7 +69,7 @@ pub fn decode_all(
     (bitmaps, spent)
 }
 
-/// What is told of a picture that can be decoded, but whose file ends before its data does; `file` names it at `place`.
+/// Warning about a picture that decodes although its file is truncated; `file` names the picture at `place`.
 pub(super) fn cut_off(name: &str, bytes: &[u8], file: &Path, place: &str) -> Option<Diagnostic> {
     let is_jpeg = ::image::guess_format(bytes).is_ok_and(|format| format == ImageFormat::Jpeg);
     if !is_jpeg || !jpeg::is_cut_off(bytes) {
@@ -80,7 +80,7 @@ pub(super) fn cut_off(name: &str, bytes: &[u8], file: &Path, place: &str) -> Opt
     Some(Diagnostic::new("image-cut-off", file, place, text).remedy("get it again"))
 }
 
-/// Why a picture cannot be used, and what helps.
+/// Why a picture cannot be used, and the remedy.
 #[derive(Debug)]
 pub(super) struct Unusable {
     pub why: String,
@@ -96,7 +96,7 @@ impl Unusable {
         Self { why: why.into(), remedy: RAISE_MEMORY }
     }
 
-    /// What is told of the image of this name, which `file` names at `place`.
+    /// Warning about the picture called `name`, which `file` names at `place`.
     pub(super) fn warning(self, name: &str, file: &Path, place: &str) -> Diagnostic {
         let text = format!("image '{}' cannot be used: {}", super::paths::shorten(name), self.why);
         let remedy = format!("the material is drawn without it; {}", self.remedy);
@@ -122,7 +122,7 @@ impl From<ImageError> for Unusable {
     }
 }
 
-/// What reads a picture.
+/// Decoder of a picture.
 #[derive(Clone, Copy)]
 enum Kind {
     Image {
@@ -133,22 +133,22 @@ enum Kind {
     Ktx,
 }
 
-/// Bytes that a decoder may take beside the pixels: for rows, and for colour profiles and texts, which may be packed and
-/// are passed over where they take more.
+/// Bytes that a decoder may take beside the pixels: for rows, colour profiles and texts. The latter may be compressed, and
+/// are skipped where they take more.
 const BESIDE: u64 = 1 << 26;
 
-/// Bytes of a texel in the smaller copies of a picture, which hold a third as many texels together.
+/// Bytes of a texel in the mip levels of a picture, which hold a third as many texels together.
 const COPIED: u64 = 8;
 
-/// Limits of a decoder that may take so many bytes.
+/// Limits of a decoder that may take `bytes` bytes.
 pub(super) fn within(bytes: u64) -> ::image::Limits {
     let mut limits = ::image::Limits::no_limits();
     limits.max_alloc = Some(bytes);
     limits
 }
 
-/// The kind of a picture: by its bytes, or where these are of no other kind and could be a TGA's, which begin with nothing
-/// of their own, by the ending of its name.
+/// Format of a picture: by its bytes, or by the extension of its name where the bytes are of no known format and could be
+/// a TGA's, which has no magic bytes.
 pub(super) fn format_of(name: &str, bytes: &[u8]) -> Option<ImageFormat> {
     let by_name = || (is_named_tga(name) && is_tga_header(bytes)).then_some(ImageFormat::Tga);
     ::image::guess_format(bytes).ok().or_else(by_name)
@@ -159,7 +159,7 @@ fn is_named_tga(name: &str) -> bool {
     ["tga", "targa", "icb", "vda", "vst"].iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
-/// Whether a TGA may begin so: with a known type, bits a pixel, and pixels.
+/// Whether the bytes could be the header of a TGA: with a known type, known bits per pixel, and pixels.
 fn is_tga_header(bytes: &[u8]) -> bool {
     let Some(&[_, map, kind, .., w, wide, h, high, depth, _]) = bytes.first_chunk::<18>() else { return false };
     map <= 1
@@ -168,10 +168,10 @@ fn is_tga_header(bytes: &[u8]) -> bool {
         && [[w, wide], [h, high]].into_iter().all(|size| u16::from_le_bytes(size) > 0)
 }
 
-/// Reads only the header; refuses what is too large.
+/// Reads only the header; refuses a picture that is too large.
 ///
-/// Taken from `budget` are the pixels as they are kept, and the smaller copies that lookups make of them: once, as it is
-/// not known here which slots will read them, and whether some take them for colours and some for data.
+/// Takes from `budget` the decoded pixels and the mip levels that lookups need: once, as it is not known here which
+/// slots will read them, and whether as colours or as data.
 fn check_size(image: &Encoded, limits: &Limits, budget: &mut Budget) -> Result<Kind, Unusable> {
     let bytes = image.bytes.as_ref();
     if ktx::is(bytes) {
@@ -190,7 +190,7 @@ fn check_size(image: &Encoded, limits: &Limits, budget: &mut Budget) -> Result<K
     let texel = if is_deep(decoder.color_type()) { 8 } else { 4 };
     let mut beside = match decoder.color_type() {
         ColorType::Rgb8 | ColorType::Rgba8 | ColorType::Rgba16 => 0,
-        // What has other pixels is decoded to them first.
+        // Other pixel types are decoded into a buffer first, then converted.
         _ => decoder.total_bytes(),
     };
     // A TGA of 16 bits or with a palette is unpacked from a copy.
@@ -199,12 +199,12 @@ fn check_size(image: &Encoded, limits: &Limits, budget: &mut Budget) -> Result<K
     Ok(Kind::Image { format, bytes: decoder.total_bytes().saturating_add(BESIDE.min(budget.left())) })
 }
 
-/// Bytes that the smaller copies of a picture of so many pixels take.
+/// Bytes of the mip levels of a picture of `pixels` pixels.
 pub(super) fn smaller_copies(pixels: u64) -> u64 {
     pixels.div_ceil(3).saturating_mul(COPIED)
 }
 
-/// Takes what a picture needs: so many bytes a pixel, those of its smaller copies, and so many more while it is decoded.
+/// Takes the memory of a picture: bytes per pixel, its mip levels, and further bytes while it is decoded.
 pub(super) fn take_memory(
     width: u32,
     height: u32,
@@ -226,7 +226,7 @@ pub(super) fn take_memory(
     budget.take(bytes, 1).map_err(|over| Unusable::too_large(over.to_string()))
 }
 
-/// What bytes that no decoder knows look like.
+/// Describes bytes that no decoder knows.
 fn unknown_kind(bytes: &[u8]) -> String {
     let kind = match bytes {
         [] => "an empty file",
@@ -246,7 +246,7 @@ fn decode(name: &str, bytes: &[u8], kind: Kind) -> Result<Bitmap, Unusable> {
     let decoder = reader.into_decoder()?;
     let (width, height) = decoder.dimensions();
     let pixels = match decoder.color_type() {
-        // What most pictures are: they are decoded to where they stay.
+        // The usual pixel types are decoded in place.
         ColorType::Rgb8 => Pixels::Rgb8(texels_of(decoder)?),
         ColorType::Rgba8 => Pixels::Rgba8(texels_of(decoder)?),
         ColorType::Rgba16 => Pixels::Rgba16(texels_of(decoder)?),
@@ -255,14 +255,14 @@ fn decode(name: &str, bytes: &[u8], kind: Kind) -> Result<Bitmap, Unusable> {
     Ok(Bitmap { name: name.into(), width, height, pixels })
 }
 
-/// What a decoder gives whose pixels are `T`.
+/// Texels of type `T` from a decoder.
 fn texels_of<T: Pod>(decoder: impl ImageDecoder) -> Result<Paged<T>, Unusable> {
     let mut texels = Paged::zeroed(usize::try_from(decoder.total_bytes()).map_or(0, |bytes| bytes / size_of::<T>()));
     decoder.read_image(bytemuck::cast_slice_mut(&mut texels))?;
     Ok(texels)
 }
 
-/// Whether its pixels are kept with 16 bits a channel.
+/// Whether the pixels are kept with 16 bits per channel.
 fn is_deep(color: ColorType) -> bool {
     matches!(color, ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16)
 }
@@ -274,7 +274,7 @@ fn pixels_of(image: DynamicImage) -> Pixels {
     }
 }
 
-/// Four numbers each, where they are if they can stay there.
+/// Groups numbers into texels of four, without copying where possible.
 fn fours<T: Pod>(numbers: Vec<T>) -> Paged<[T; 4]>
 where
     [T; 4]: Pod,
@@ -374,7 +374,7 @@ mod tests {
                 let (bitmap, warnings) = decode_named(name, &bytes, &limits);
                 assert!(bitmap.is_none() && warnings[0].remedy.ends_with("--max-memory"), "{}", warnings[0]);
             }
-            // As wide and high as can be said, with next to nothing behind.
+            // The largest size that the header can express, with next to no data.
             let sides = if format == ImageFormat::Tga { 12..16 } else { 18..26 };
             bytes[sides].fill(if format == ImageFormat::Tga { 0xff } else { 0x7f });
             assert!(decode_named(name, &bytes, &Limits::default()).0.is_none());
@@ -393,7 +393,7 @@ mod tests {
                 for _ in 0..3000 {
                     let mut bytes = whole.clone();
                     for _ in 0..=random.below(5) {
-                        // Most often in the header.
+                        // Mostly in the header.
                         let end = if random.below(4) == 0 { bytes.len() } else { 60.min(bytes.len()) };
                         let at = random.below(end);
                         bytes[at] = random.bits().to_le_bytes()[0];
@@ -441,7 +441,7 @@ mod tests {
     fn pixels_are_counted_as_they_are_kept_with_smaller_copies_and_what_is_too_large_names_the_remedy() {
         for (image, bytes) in [(DynamicImage::new_rgba8(60, 50), 4), (DynamicImage::new_rgba16(60, 50), 8)] {
             let file = png(image);
-            // A third as many are in smaller copies, with eight bytes each.
+            // Mip levels have a third as many texels, of eight bytes each.
             let memory = 60 * 50 * bytes + 1000 * 8;
             let limits = |memory| Limits { memory, ..Limits::default() };
             assert!(decode_one(&file, &limits(memory)).0.is_some());
@@ -455,7 +455,7 @@ mod tests {
 
     #[test]
     fn a_picture_that_the_budget_allows_is_not_too_large_for_its_decoder() {
-        // 12 000 × 12 000 pixels of four bytes, none of which are there.
+        // 12 000 × 12 000 pixels of four bytes, without any pixel data.
         let mut file = Vec::new();
         let mut encoder = ::png::Encoder::new(&mut file, 12_000, 12_000);
         encoder.set_color(::png::ColorType::Rgba);

@@ -1,15 +1,15 @@
-//! Whole files, read into memory.
+//! Reading whole files into memory.
 
 use std::fs::File;
 use std::io::{self, Read};
 
-/// Files from this size on are read by all threads.
+/// Size from which on files are read by all threads, in bytes.
 const LARGE: u64 = 1 << 22;
 
-/// Reads a file of `length` bytes, or of more by now: up to `most` and one more, which tells that there are too many.
+/// Reads a file whose length was `length` and may have grown: at most `most` + 1 bytes, so that the caller can detect excess.
 ///
 /// # Errors
-/// Those of the system.
+/// I/O errors.
 pub(super) fn read(file: File, length: u64, most: u64) -> io::Result<Vec<u8>> {
     if (LARGE..=most).contains(&length)
         && rayon::current_num_threads() > 1
@@ -20,23 +20,23 @@ pub(super) fn read(file: File, length: u64, most: u64) -> io::Result<Vec<u8>> {
     read_in_turn(file, length, most)
 }
 
-/// Reads a whole file by this thread alone.
+/// Reads a whole file by this thread alone; parameters as for [`read`].
 ///
 /// # Errors
-/// Those of the system.
+/// I/O errors.
 pub(super) fn read_in_turn(file: File, length: u64, most: u64) -> io::Result<Vec<u8>> {
-    // Room for one more than there are, so that reading to the end needs no larger one.
+    // Capacity for one byte more than the file has, so that reading to the end does not reallocate.
     let mut bytes = Vec::with_capacity(usize::try_from(length).map_or(0, |length| length.saturating_add(1)));
     file.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
-/// All parts of a file at a time; `None` where it has to be read from its start to its end.
+/// Reads all parts of a file in parallel; `None` where it must be read sequentially.
 #[cfg(unix)]
 fn read_in_parts(file: &File, length: u64) -> Option<Vec<u8>> {
     use rayon::prelude::*;
     use std::os::unix::fs::FileExt;
-    /// What one thread reads at a time.
+    /// Bytes that one thread reads at a time.
     const PART: usize = 1 << 20;
 
     let mut bytes = vec![0; usize::try_from(length).ok()?];
@@ -44,7 +44,7 @@ fn read_in_parts(file: &File, length: u64) -> Option<Vec<u8>> {
     let parts: Vec<(u64, &mut [u8])> = starts.zip(bytes.chunks_mut(PART)).collect();
     let read = |(start, part): (u64, &mut [u8])| file.read_exact_at(part, start).is_ok();
     let complete = parts.into_par_iter().with_max_len(1).all(read);
-    // A file that is being written may be longer than it was.
+    // A file that is being written may have grown.
     let ends = matches!(file.read_at(&mut [0], length), Ok(0));
     (complete && ends).then_some(bytes)
 }
@@ -71,7 +71,7 @@ mod tests {
         };
         for threads in [1, 3] {
             assert!(read(threads, length, u64::MAX) == bytes);
-            // It was shorter, or longer, when its length was asked for.
+            // The file grew or shrank after its length was read.
             assert!(read(threads, length - 7, u64::MAX) == bytes);
             assert!(read(threads, length + 7, u64::MAX) == bytes);
             assert!(read(threads, length, length - 9) == bytes[..bytes.len() - 8]);
