@@ -11,21 +11,21 @@ use std::collections::HashMap;
 use std::mem::size_of;
 
 /// Half a unit of the sixth digit, which is what generators print: corners this far off a plane, relative to the
-/// largest coordinate of the polygon, still lie in it.
+/// largest coordinate of the polygon, still count as coplanar.
 const FLAT: f64 = 1e-6;
 
 /// Bytes that a corner takes until it is part of a mesh: as a vertex, twice in `f64` and in the mesh with its normal, in a
-/// table that is never less than half full once it has grown, and as that of a triangle.
+/// table that is never less than half full once it has grown, and as the corner of a triangle.
 const CORNER: u64 = 2 * 24 + 3 * 12 + 2 * 64 + 2 * 16;
 
-/// Bytes that a mesh takes, empty.
+/// Bytes of an empty mesh.
 const PART: u64 = 2 * (size_of::<Part>() + size_of::<Mesh>() + size_of::<Instance>()) as u64;
 
 /// All faces of the file.
 pub(super) struct Faces {
     polygons: Polygons,
     parts: Vec<Part>,
-    /// Of a material and whether there are normals.
+    /// Index of each part, by material and whether it has normals.
     known: HashMap<(u32, bool), usize>,
     clipper: EarClipper,
     /// Faces without area, which were not added.
@@ -34,22 +34,22 @@ pub(super) struct Faces {
     pub far: u64,
 }
 
-/// What has become of the faces.
+/// Result of [`Faces::finish`].
 pub(super) struct Finished {
-    /// Faces drawn.
+    /// Number of faces drawn.
     pub count: u64,
-    /// Triangles that rounding has collapsed.
+    /// Number of triangles that collapsed by rounding.
     pub collapsed: u64,
     /// The largest displacement by rounding to `f32`.
     pub max_rounding: f64,
 }
 
-/// A mesh in the making, positions in `f64`.
+/// A mesh under construction, positions in `f64`.
 #[derive(Default)]
 struct Part {
     mesh: Mesh,
     positions: Vec<DVec3>,
-    /// Vertices by the bits of position and normal.
+    /// Vertex numbers by the bits of position and normal.
     numbers: HashMap<[u64; 6], u32>,
     faces: u32,
 }
@@ -63,7 +63,7 @@ impl Faces {
     /// Adds one face; `normals` is empty or has one for each corner.
     ///
     /// # Errors
-    /// When it would take more than is left of `budget`.
+    /// When memory would exceed `budget`.
     pub(super) fn add(
         &mut self,
         material: u32,
@@ -114,7 +114,7 @@ impl Faces {
         Ok(())
     }
 
-    /// Hands the meshes to the scene, each around its own centre.
+    /// Moves the meshes to the scene, each relative to its own centre.
     pub(super) fn finish(self, scene: &mut Scene) -> Finished {
         let mut out = Finished { count: 0, collapsed: 0, max_rounding: 0.0 };
         for Part { mut mesh, positions, .. } in self.parts {
@@ -132,10 +132,10 @@ impl Faces {
 }
 
 impl Part {
-    /// The number of a vertex; equal ones share it, so that faces are connected.
+    /// Number of a vertex; equal ones share it, so that faces are connected.
     fn vertex(&mut self, p: DVec3, normal: Option<DVec3>) -> u32 {
         let n = normal.unwrap_or_default();
-        // Adding 0 makes one zero of two.
+        // Adding 0 maps −0 to +0.
         let key = [p.x, p.y, p.z, n.x, n.y, n.z].map(|x| (x + 0.0).to_bits());
         let next = index(self.positions.len());
         let number = *self.numbers.entry(key).or_insert(next);

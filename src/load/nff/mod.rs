@@ -5,7 +5,7 @@
 //! | `v from x y z at x y z up x y z angle a hither h resolution w h` | the camera; `a` is the whole angle of view, degrees |
 //! | `b r g b` | background |
 //! | `l x y z [r g b]` | a point light that does not fade |
-//! | `f r g b Kd Ks shine T ior` | material of what follows |
+//! | `f r g b Kd Ks shine T ior` | material of the following shapes |
 //! | `p n`, then n times `x y z` | polygon |
 //! | `pp n`, then n times `x y z nx ny nz` | polygon with a normal for each corner |
 //! | `s x y z r` | sphere |
@@ -34,14 +34,14 @@ use std::mem::size_of;
 use std::path::Path;
 use words::Words;
 
-/// Loads an NFF file; whatever that takes comes out of `budget`.
+/// Loads an NFF file; its memory is taken from `budget`.
 ///
 /// # Errors
-/// At the first statement that is not NFF, with its line, or when it would take more than is left. A file without shapes
+/// At the first invalid statement, with its line, or when memory would exceed the budget. A file without shapes
 /// is an empty scene.
 pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
     if std::str::from_utf8(&source.bytes).is_err() {
-        // A sign of three bytes stands for each that is no text.
+        // Each invalid byte is replaced by a character of three bytes.
         budget.take(source.bytes.len() as u64, 3).map_err(|over| Diagnostic::over_budget(&source.path, over))?;
     }
     let text = String::from_utf8_lossy(&source.bytes);
@@ -78,7 +78,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }
 
-/// What hangs on the whole file: strength of lights, what is around, and which way is up.
+/// Sets what depends on the whole file: the strength of lights, the environment, and the up axis.
 fn finish(scene: &mut Scene, options: &LoadOptions) {
     let lights = scene.lights.len() as f32;
     if lights > 0.0 {
@@ -90,7 +90,7 @@ fn finish(scene: &mut Scene, options: &LoadOptions) {
         scene.environment = Environment::Constant(color);
     }
     scene.up = options.up.unwrap_or(scene.up);
-    // The text's own depth, the eye ray counted: 5.
+    // The depth of the format's text, which counts the eye ray: 5.
     scene.hints.depth = Some(4);
     scene.hints.tone_map = Some("none".into());
 }
@@ -100,9 +100,9 @@ struct Reader<'a> {
     file: &'a Path,
     budget: &'a mut Budget,
     scene: Scene,
-    /// The material of what follows.
+    /// Material of the following shapes.
     material: Option<u32>,
-    /// Materials by the bits of the numbers of their fill.
+    /// Materials by the bits of their fill's numbers.
     fills: HashMap<[u64; 8], u32>,
     faces: Faces,
     /// Spheres and cones without extent.
@@ -111,7 +111,7 @@ struct Reader<'a> {
     far: u64,
 }
 
-/// Bytes that a material takes, with its name and its place in the table, in lists that have grown by doubling.
+/// Bytes that a material takes, with its name and its table entry, in lists that have grown by doubling.
 const FILL: u64 = 2 * (size_of::<Material>() + 2 * size_of::<[u64; 8]>() + 128) as u64;
 
 impl Reader<'_> {
@@ -145,7 +145,7 @@ impl Reader<'_> {
                 "at" => (at, line_of_place) = (self.words.point(key)?, self.words.line),
                 "up" => up = self.words.point(key)?,
                 "angle" => (angle, line_of_angle) = (self.words.number(key)?, self.words.line),
-                // A near distance, for programs that cannot see closer.
+                // A near distance, for renderers that need one; not used.
                 "hither" => _ = self.words.number(key)?,
                 _ => size = Some((self.words.whole(key, 1)?, self.words.whole(key, 1)?)),
             }
@@ -197,7 +197,7 @@ impl Reader<'_> {
                 shininess: shine.max(0.0) as f32,
                 mirror,
                 transmission,
-                // The index of what is opaque means nothing, and is often 0.
+                // The index of opaque materials means nothing, and is often 0.
                 ior: if t > 0.0 && ior >= 1.0 { ior as f32 } else { 1.0 },
                 ..Phong::default()
             };
@@ -213,7 +213,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The material of what follows; a plain one where the file has named none yet.
+    /// Material of the following shapes; a plain one where the file has set none yet.
     fn material(&mut self) -> u32 {
         if self.material.is_none() {
             self.scene.materials.push(Material::plain());
@@ -221,7 +221,7 @@ impl Reader<'_> {
         *self.material.get_or_insert(index(self.scene.materials.len() - 1))
     }
 
-    /// Takes so many bytes, or refuses the file.
+    /// Takes `bytes` bytes of the budget, or refuses the file.
     fn take(&mut self, bytes: u64) -> Result<(), Diagnostic> {
         self.budget.take(bytes, 1).map_err(|over| Diagnostic::over_budget(self.file, over))
     }

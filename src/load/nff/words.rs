@@ -1,37 +1,37 @@
-//! Text -> words with their lines. NFF is a stream of words: line ends count as blanks.
+//! Text -> words with their lines. NFF is a stream of words: line ends count as white space.
 
 use crate::load::Diagnostic;
 use crate::load::diagnostic::CUT_OFF;
 use crate::math::DVec3;
 use std::path::Path;
 
-/// The words of the file, one after another.
+/// Cursor over the words of the file.
 pub(super) struct Words<'a> {
     file: &'a Path,
-    /// What follows [`Self::next`].
+    /// Text behind [`Self::next`].
     rest: &'a str,
     /// Line that `rest` starts in, from 1.
     rest_line: u32,
     /// The next word, and its line.
     next: Option<(&'a str, u32)>,
-    /// Line of the last word that was taken, from 1.
+    /// Line of the last word consumed, from 1.
     pub(super) line: u32,
 }
 
 impl<'a> Words<'a> {
-    /// The words of a text; `#` starts a comment.
+    /// Cursor at the start of a text; `#` starts a comment.
     pub(super) fn new(file: &'a Path, text: &'a str) -> Self {
         let mut words = Self { file, rest: text, rest_line: 1, next: None, line: 1 };
         words.next = words.find();
         words
     }
 
-    /// Passes over blanks and comments, and takes the word behind them.
+    /// Skips white space and comments, and reads the word behind them.
     fn find(&mut self) -> Option<(&'a str, u32)> {
         let bytes = self.rest.as_bytes();
         let (mut at, mut in_comment) = (0, false);
         while let Some(&byte) = bytes.get(at).filter(|b| in_comment || **b == b'#' || b.is_ascii_whitespace()) {
-            // CR LF is one line end, counted at its second half.
+            // CR LF is one line end, counted at the LF.
             let ends = byte == b'\n' || (byte == b'\r' && bytes.get(at + 1) != Some(&b'\n'));
             self.rest_line = self.rest_line.saturating_add(u32::from(ends));
             in_comment = (in_comment || byte == b'#') && !matches!(byte, b'\n' | b'\r');
@@ -44,12 +44,12 @@ impl<'a> Words<'a> {
         Some((word, self.rest_line))
     }
 
-    /// The next word, left where it is.
+    /// Returns the next word without consuming it.
     pub(super) fn peek(&self) -> Option<&'a str> {
         self.next.map(|(word, _)| word)
     }
 
-    /// Takes the next word.
+    /// Consumes the next word.
     pub(super) fn next(&mut self) -> Option<&'a str> {
         let (word, line) = self.next?;
         self.line = line;
@@ -57,17 +57,17 @@ impl<'a> Words<'a> {
         Some(word)
     }
 
-    /// A fault at the last word.
+    /// Fault at the last word.
     pub(super) fn fault(&self, text: impl Into<String>, remedy: &str) -> Diagnostic {
         self.fault_at(self.line, text, remedy)
     }
 
-    /// A fault of something that stood in an earlier line.
+    /// Fault on an earlier line.
     pub(super) fn fault_at(&self, line: u32, text: impl Into<String>, remedy: &str) -> Diagnostic {
         Diagnostic::new("nff-syntax", self.file, line.to_string(), text).remedy(remedy)
     }
 
-    /// A finite number of statement `of`.
+    /// Reads a finite number of statement `of`.
     pub(super) fn number(&mut self, of: &str) -> Result<f64, Diagnostic> {
         let Some(word) = self.next() else {
             return Err(self.fault(format!("the file ends inside `{of}`, where a number should follow"), CUT_OFF));
@@ -78,7 +78,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// `N` numbers.
+    /// Reads `N` numbers.
     pub(super) fn numbers<const N: usize>(&mut self, of: &str) -> Result<[f64; N], Diagnostic> {
         let mut all = [0.0; N];
         for n in &mut all {
@@ -87,12 +87,12 @@ impl<'a> Words<'a> {
         Ok(all)
     }
 
-    /// Three numbers.
+    /// Reads three numbers.
     pub(super) fn point(&mut self, of: &str) -> Result<DVec3, Diagnostic> {
         self.numbers::<3>(of).map(DVec3::from)
     }
 
-    /// A whole number from `low` to a million.
+    /// Reads a whole number from `low` to a million.
     pub(super) fn whole(&mut self, of: &str, low: u32) -> Result<u32, Diagnostic> {
         let n = self.number(of)?;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just before")]

@@ -1,9 +1,9 @@
-//! A run of whole lines -> its statements, read without knowing what stands before it.
+//! Reads a run of whole lines into its statements, without knowing what stands before it.
 //!
-//! What depends on the lines before is left open and filled in when the runs are joined (`join`): numbers of lines and
-//! faces count from the start of the run, numbers of vertices that count back are relative to it, and names and smoothing
+//! What depends on earlier lines is left open and resolved when the runs are joined (`join`): numbers of lines and
+//! faces count from the start of the run, vertex numbers that count back are relative to it, and names and smoothing
 //! groups that were set before are [`OPEN`]. Most lines are plain (`v`, `vt`, `vn` or `f` with numbers as programs print
-//! them) and read in one pass over their bytes; everything else goes word by word.
+//! them) and read in one pass over their bytes; all others are read word by word.
 
 use super::statements::Oddities;
 use crate::load::geometry::{Face, FaceSpan, LARGEST, Run, WireStatement};
@@ -13,13 +13,13 @@ use crate::load::text::lines::{Lines, keyword, without_comment, words};
 use crate::math::{DVec2, DVec3, Vec3};
 use std::collections::HashMap;
 
-/// A name, smoothing group or material that was set before the run.
+/// Stands for a name, smoothing group or material that was set before the run.
 pub(super) const OPEN: u32 = u32::MAX;
 
-/// Marks the number of a vertex as relative to the start of the run; the rest of its bits hold it plus [`LARGEST`].
+/// Marks a vertex number as relative to the start of the run; the other bits hold the number plus [`LARGEST`].
 const RELATIVE: u32 = 1 << 31;
 
-/// The number of a vertex, given how many stand before the run; `None` for one before the first.
+/// Absolute vertex number, given how many vertices precede the run; `None` for a number before the first.
 pub(super) fn resolve(number: u32, before: u32) -> Option<u32> {
     if number & RELATIVE == 0 {
         return Some(number);
@@ -28,17 +28,17 @@ pub(super) fn resolve(number: u32, before: u32) -> Option<u32> {
     u32::try_from(absolute).ok().filter(|&n| n > 0)
 }
 
-/// What a run of lines holds.
+/// Contents of a run of lines.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Chunk {
     pub positions: Vec<DVec3>,
     /// v points up.
     pub uvs: Vec<DVec2>,
-    /// Unit length; zero for those without a direction.
+    /// Unit normals; zero where they have no direction.
     pub normals: Vec<Vec3>,
-    /// As written, [`NO_COLOR`] where there is none; may end before the last position.
+    /// Colours as written, [`NO_COLOR`] for vertices without one; may be shorter than `positions`.
     pub colors: Vec<[f32; 3]>,
-    /// Colours that a program has written into comments, 0…255: of the first vertices of the file, one after the other.
+    /// Colours in comments of ZBrush, 0…255: those of the first vertices of the file, in order.
     pub paint: Vec<[u8; 3]>,
     /// Corners of all faces.
     pub corners: Corners,
@@ -47,29 +47,29 @@ pub(super) struct Chunk {
     pub faces: Vec<FaceSpan>,
     /// Points and lines.
     pub wire_statements: Vec<WireStatement>,
-    /// Their corners, as [`Self::corners`].
+    /// Corners of points and lines, as [`Self::corners`].
     pub wire_corners: Vec<[u32; 3]>,
     pub runs: Vec<Run>,
-    /// 0 is the empty one.
+    /// Names; 0 is the empty one.
     pub names: Vec<String>,
     pub libraries: Vec<(u32, String)>,
     pub places: i32,
     pub comments: Vec<String>,
     pub odd: Oddities,
-    /// Lines, and faces of any number of corners.
+    /// Number of lines, and of faces of any number of corners.
     pub lines: u32,
     pub face_count: u32,
-    /// What the last faces are in.
+    /// Run of the last faces.
     pub last: Run,
     pub smoothing: u32,
     /// Whether a corner cannot be read: the file is refused, and another pass finds out why.
     pub faulty: bool,
 }
 
-/// Corners: numbers of `v`, `vt`, `vn` from 1, for [`resolve`]; 0: none given.
+/// Corners: numbers of `v`, `vt`, `vn` from 1, for [`resolve`]; 0: none.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Corners {
-    /// Those of `v`, as long as no corner names anything else: most scans have no more.
+    /// Numbers of `v` alone, while no corner names anything else: the case of most scans.
     vertices: Vec<u32>,
     all: Vec<[u32; 3]>,
 }
@@ -84,7 +84,7 @@ impl Corners {
         self.all.get(i).copied().unwrap_or_else(|| [self.vertices[i], 0, 0])
     }
 
-    /// The numbers of `v`, where no corner names anything else.
+    /// Numbers of `v`, where no corner names anything else.
     pub(super) fn vertices_alone(&self) -> Option<&[u32]> {
         self.all.is_empty().then_some(&self.vertices)
     }
@@ -108,19 +108,19 @@ impl Corners {
     }
 }
 
-/// Comments that are kept: generators write theirs first.
+/// Number of comments that are kept: generators write theirs first.
 pub(super) const COMMENTS: usize = 64;
 
-/// Comments in which ZBrush writes what vertices are painted with.
+/// Start of comments in which ZBrush writes the colours of vertices.
 const PAINT: &[u8] = b"#MRGB ";
 
-/// Statements of free-form geometry that draw something.
+/// Statements of free-form geometry that draws something.
 const CURVES: [&[u8]; 5] = [b"curv", b"curv2", b"surf", b"bzp", b"bsp"];
 
-/// Statements that stand for others: those of another file, or what a command writes.
+/// Statements that stand for others: those of another file, or the output of a command.
 const CALLS: [&[u8]; 2] = [b"call", b"csh"];
 
-/// Statements that change nothing in what is drawn.
+/// Statements that do not change what is drawn.
 const SILENT: [&[u8]; 27] = [
     b"vp",
     b"cstype",
@@ -151,7 +151,7 @@ const SILENT: [&[u8]; 27] = [
     b"vw",
 ];
 
-/// The colour of a vertex that has none, which no file can say.
+/// Marks a vertex without a colour; no file can express it.
 pub(super) const NO_COLOR: [f32; 3] = [f32::NAN; 3];
 
 /// Reads a run of whole lines.
@@ -177,7 +177,7 @@ pub(super) fn read(text: &[u8]) -> Chunk {
 
 struct Reader {
     out: Chunk,
-    /// The line at hand, from 1.
+    /// Current line, from 1.
     line: u32,
     name_ids: HashMap<String, u32>,
     run_ids: HashMap<Run, u32>,
@@ -187,7 +187,7 @@ struct Reader {
 
 /// Plain lines.
 impl Reader {
-    /// Reads the plain line that `text` starts with; its length with the line end. `None`: nothing was read.
+    /// Reads the plain line that `text` starts with and returns its length with the line end; `None` if nothing was read.
     #[inline]
     fn plain(&mut self, text: &[u8], line: u32) -> Option<usize> {
         match text {
@@ -222,7 +222,7 @@ impl Reader {
     fn plain_coordinate(&mut self, text: &[u8]) -> Option<usize> {
         let mut at = 2;
         let [u, v] = [next_number(text, &mut at)?, next_number(text, &mut at)?];
-        // Some programs write a third one; it is not used.
+        // Some programs write a third one; it is ignored.
         let end = line_end(text, at).or_else(|| next_number(text, &mut at).and_then(|_| line_end(text, at)))?;
         self.out.uvs.push(DVec2::new(u.value, v.value));
         Some(end)
@@ -249,7 +249,7 @@ impl Reader {
     }
 }
 
-/// The number after white space, which must be there.
+/// Number behind white space, which must be present.
 #[inline]
 fn next_number(text: &[u8], at: &mut usize) -> Option<Plain> {
     let rest = &text[*at..];
@@ -259,7 +259,7 @@ fn next_number(text: &[u8], at: &mut usize) -> Option<Plain> {
     Some(number)
 }
 
-/// Where the next line starts if nothing but white space is left in this one.
+/// Start of the next line if only white space is left on this one.
 #[inline]
 fn line_end(text: &[u8], at: usize) -> Option<usize> {
     let end = at + text[at..].iter().take_while(|b| matches!(b, b' ' | b'\t')).count();
@@ -272,7 +272,7 @@ fn line_end(text: &[u8], at: usize) -> Option<usize> {
     }
 }
 
-/// `v`, `v/vt`, `v//vn` or `v/vt/vn` of numbers that count from the first.
+/// Reads `v`, `v/vt`, `v//vn` or `v/vt/vn` of positive numbers.
 #[inline]
 fn plain_corner(text: &[u8], at: &mut usize) -> Option<[u32; 3]> {
     let mut corner = [plain_index(text, at)?, 0, 0];
@@ -291,7 +291,7 @@ fn plain_corner(text: &[u8], at: &mut usize) -> Option<[u32; 3]> {
 
 #[inline]
 fn plain_index(text: &[u8], at: &mut usize) -> Option<u32> {
-    /// Longer ones may be too large.
+    /// Most digits; longer numbers may be too large.
     const DIGITS: usize = 9;
     let (mut index, start) = (0u32, *at);
     while let Some(digit) = text.get(*at).map(|b| b.wrapping_sub(b'0')).filter(|&d| d < 10) {
@@ -324,7 +324,7 @@ impl Reader {
             b"mtllib" => self.out.libraries.push((self.line, decode_name(rest))),
             b"l" => self.wire(rest, true),
             b"p" => self.wire(rest, false),
-            // Continued blank lines leave no word.
+            // Continued blank lines hold no word.
             b"" => {}
             _ if word.starts_with(b"#") => self.comment(text),
             _ if CURVES.contains(&word) => self.out.odd.curves.note(self.line, word),
@@ -347,7 +347,7 @@ impl Reader {
         }
     }
 
-    /// Of each vertex a mask and red, green and blue, two hexadecimal digits each.
+    /// Reads a mask and red, green and blue of each vertex, two hexadecimal digits each.
     fn paint(&mut self, digits: &[u8]) {
         let digit = |d: u8| char::from(d).to_digit(16).and_then(|d| u8::try_from(d).ok());
         let byte = |[high, low]: [u8; 2]| Some(16 * digit(high)? + digit(low)?);
@@ -357,7 +357,7 @@ impl Reader {
         self.out.paint.extend(colors);
     }
 
-    /// A `v` statement: three coordinates, then perhaps a weight, or a colour, or a colour with alpha.
+    /// Reads a `v` statement: three coordinates, optionally a weight, or a colour, or a colour with alpha.
     fn vertex(&mut self, rest: &[u8]) {
         let position = self.numbers(3, rest, 0.0);
         for word in words(rest).take(3) {
@@ -381,7 +381,7 @@ impl Reader {
         }
     }
 
-    /// The colour of the last vertex.
+    /// Sets the colour of the last vertex.
     fn color(&mut self, words: [&[u8]; 3]) {
         let color = words.map(|w| {
             let checked = number::check(w);
@@ -397,7 +397,7 @@ impl Reader {
         }
     }
 
-    /// The first numbers of a line, of which at least `needed` should be there; missing ones become `filler`.
+    /// First numbers of a line, of which at least `needed` should exist; missing ones become `filler`.
     fn numbers<const N: usize>(&mut self, needed: usize, rest: &[u8], filler: f64) -> [f64; N] {
         let (mut numbers, mut found) = ([filler; N], 0);
         for (number, word) in numbers.iter_mut().zip(words(rest)) {
@@ -414,7 +414,7 @@ impl Reader {
         numbers
     }
 
-    /// A normal is nothing without all three of its numbers.
+    /// Reads a normal, which counts only with all three of its numbers.
     fn normal(&mut self, rest: &[u8]) -> DVec3 {
         let mut normal = [f64::NAN; 3];
         for (number, word) in normal.iter_mut().zip(words(rest)) {
@@ -479,7 +479,7 @@ impl Reader {
         self.push_face(arity);
     }
 
-    /// A `p` or `l` statement; one that cannot be read is counted and left out.
+    /// Reads a `p` or `l` statement; an invalid one is counted and left out.
     fn wire(&mut self, rest: &[u8], joined: bool) {
         let first = self.out.wire_corners.len();
         for word in words(rest) {
@@ -498,8 +498,8 @@ impl Reader {
         self.out.wire_statements.push(WireStatement { run, line: self.line, arity, joined });
     }
 
-    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, or back from the last one with −1. Some programs write 0
-    /// for a coordinate or normal that is not there.
+    /// Reads `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, or back from the last one with −1. Some programs write 0
+    /// for a missing coordinate or normal.
     fn corner(&mut self, word: &[u8]) -> Option<[u32; 3]> {
         let known = [self.out.positions.len(), self.out.uvs.len(), self.out.normals.len()];
         let mut out = [0; 3];
@@ -513,7 +513,7 @@ impl Reader {
                     self.out.odd.zero.note(self.line, ATTRIBUTES[kind].as_bytes());
                     0
                 }
-                // More than there can be: none that is there, like the largest.
+                // More than there can be: names nothing that exists, like the largest.
                 Ok(number) if kind > 0 => number.min(LARGEST),
                 Ok(number) => Some(number).filter(|n| (1..=LARGEST).contains(n))?,
                 Err(_) => {
@@ -526,10 +526,10 @@ impl Reader {
     }
 }
 
-/// What the numbers of a corner name.
+/// Kinds of data that the numbers of a corner name.
 pub(super) const ATTRIBUTES: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
-/// What both kinds of lines end in.
+/// Steps shared by plain and other lines.
 impl Reader {
     #[inline]
     fn push_position(&mut self, position: DVec3) {
@@ -568,7 +568,7 @@ impl Reader {
     }
 }
 
-/// A whole number, if the word is one.
+/// Parses a whole number.
 pub(super) fn whole(word: &[u8]) -> Option<i64> {
     let (negative, digits) = match word {
         [b'-', digits @ ..] => (true, digits),
@@ -582,7 +582,7 @@ pub(super) fn whole(word: &[u8]) -> Option<i64> {
     Some(if negative { -value } else { value })
 }
 
-/// Lengths beyond `u32` are refused at the end of reading; until then they only must not wrap.
+/// Length as `u32`. Larger ones saturate here, and are refused at the end of reading.
 pub(super) fn count(length: usize) -> u32 {
     u32::try_from(length).unwrap_or(u32::MAX)
 }

@@ -1,5 +1,5 @@
-//! What is wrong with the corners of a text that cannot be read: a pass of its own, line after line, that only such texts
-//! pay for.
+//! Finds the invalid corners of a text that cannot be read: a pass of its own, line by line, that only such texts
+//! need.
 
 use super::chunk::{ATTRIBUTES, count, whole};
 use super::statements::Tally;
@@ -9,7 +9,7 @@ use crate::load::text::encoding::decode_name;
 use crate::load::text::lines::{Lines, keyword, words};
 use std::path::Path;
 
-/// The first fault, with the number of all of its kind; or, where there is none, the corners that name texture
+/// Finds the first fault, with the number of all of its kind. Where there is none, counts the corners that name texture
 /// coordinates or normals of which the file has none at all: such faces can still be drawn.
 pub(super) fn find(text: &[u8], file: &Path) -> Result<Tally, Diagnostic> {
     let mut look = Look { file, line: 0, counts: [0; 3], faults: Vec::new(), forward: Vec::new() };
@@ -30,11 +30,11 @@ pub(super) fn find(text: &[u8], file: &Path) -> Result<Tally, Diagnostic> {
 struct Look<'a> {
     file: &'a Path,
     line: u32,
-    /// How many `v`, `vt` and `vn` there are so far.
+    /// Numbers of `v`, `vt` and `vn` so far.
     counts: [u32; 3],
-    /// The first fault of each kind and its line, counting the others of its kind.
+    /// First fault of each kind and its line; its count includes the others of its kind.
     faults: Vec<(u32, Diagnostic)>,
-    /// Numbers of vertices that were not there yet when a face named them: (line, corner, kind, number).
+    /// Numbers that named data not yet defined: (line, corner, kind, number).
     forward: Vec<(u32, u32, usize, u32)>,
 }
 
@@ -47,14 +47,14 @@ impl Look<'_> {
         }
     }
 
-    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, or back from the last one with −1.
+    /// Checks `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, or back from the last one with −1.
     fn corner(&mut self, word: &[u8], corner: u32) -> Result<(), Diagnostic> {
         for (kind, part) in word.split(|&b| b == b'/').enumerate() {
             if part.is_empty() && kind > 0 {
                 continue;
             }
             let Some(number) = whole(part).filter(|_| kind < 3) else { return Err(self.unreadable(word, corner)) };
-            // None, which reading has counted.
+            // None; the reader has counted it.
             if number == 0 && kind > 0 {
                 continue;
             }

@@ -1,11 +1,11 @@
-//! Texts that nobody wrote: whatever comes in, the loader ends with a scene that holds together or with an error.
+//! Arbitrary texts: the loader returns a sound scene or an error, whatever the input.
 
 use super::*;
 use crate::load::geometry::invariants::assert_sound;
 use crate::load::{Polygons, load_source, mtl};
 use proptest::prelude::*;
 
-/// Words that OBJ and MTL texts are made of, and what breaks them.
+/// Words of OBJ and MTL texts, and values that break them.
 const WORDS: [&str; 44] = [
     "v", "vt", "vn", "f", "l", "p", "o", "g", "s", "usemtl", "mtllib", "#", "\\", "0", "1", "2", "3", "4", "-1", "-2",
     "5/1", "1/2/3", "2//1", "-1/-1/-1", "0.5", "1e300", "-1e-300", "nan", "1.#IND", "1,5", "3.1+e2", "off", "name",

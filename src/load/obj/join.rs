@@ -1,4 +1,4 @@
-//! Runs of lines, read side by side -> the statements of the whole text, as if it had been read line after line.
+//! Joins runs of lines, which were read in parallel, into the statements of the whole text, as if read sequentially.
 
 use super::chunk::{COMMENTS, Chunk, NO_COLOR, OPEN, count, resolve};
 use super::statements::Statements;
@@ -8,14 +8,14 @@ use crate::parts::{cut, joined};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// The whole, and whether its corners name what is there.
+/// Statements of the whole text, and whether its faces are valid.
 pub(super) struct Joined {
     pub statements: Statements,
-    /// Whether a corner cannot be read, or names something that is not there.
+    /// Whether a corner cannot be read, or names a vertex, coordinate or normal that does not exist.
     pub faulty: bool,
 }
 
-/// Where a run of lines begins in the whole: how many of each stand before it.
+/// Start of a run of lines in the whole text: counts of what stands before it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Before {
     counts: [u32; 3],
@@ -27,7 +27,7 @@ struct Before {
 /// Joins runs in the order of the text.
 ///
 /// # Errors
-/// How many vertices, corners or faces there are, when that is more than [`LARGEST`].
+/// The number of vertices, corners or faces, when that exceeds [`LARGEST`].
 pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
     let mut out = Statements::default();
     let mut table = Table::new();
@@ -63,7 +63,7 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
     Ok(Joined { statements: out, faulty })
 }
 
-/// The faces of all runs of lines, as the whole numbers them.
+/// Faces of all runs of lines, renumbered for the whole text.
 fn face_spans(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<FaceSpan> {
     let mut all: Vec<FaceSpan> = Vec::with_capacity(chunks.iter().map(|chunk| chunk.faces.len()).sum());
     let mut first = 0;
@@ -84,8 +84,8 @@ fn face_spans(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<Fac
     all
 }
 
-/// The vertices of triangles, of so many, where there is nothing else and nothing more is said of them; `None` too where one is
-/// not there.
+/// Vertices of the triangles, where the text holds only triangles that name positions alone; `None` otherwise, and where a
+/// vertex is not below `vertices`.
 fn triangles(chunks: &[Chunk], begins: &[Before], vertices: u32, face_spans: &[FaceSpan]) -> Option<Vec<[u32; 3]>> {
     let is_plain = |span: &FaceSpan| (span.face.arity, span.face.smoothing) == (3, 0);
     let of_faces = |chunk: &Chunk| chunk.wire_statements.is_empty() && chunk.dropped.is_empty() && !chunk.faulty;
@@ -99,7 +99,7 @@ fn triangles(chunks: &[Chunk], begins: &[Before], vertices: u32, face_spans: &[F
     let parts = cut(&mut all, numbers.iter().map(|numbers| numbers.len() / 3));
     let fill = |((part, numbers), before): ((&mut [[u32; 3]], &[u32]), &Before)| {
         part.as_flattened_mut().iter_mut().zip(numbers).all(|(vertex, &number)| {
-            // 0 is none.
+            // 0 means none; it wraps to a number that is never below `vertices`.
             *vertex = resolve(number, before.counts[0]).unwrap_or(0).wrapping_sub(1);
             *vertex < vertices
         })
@@ -136,7 +136,7 @@ impl Before {
     }
 }
 
-/// What is collected and not counted on.
+/// Moves what needs no renumbering, except for lines, to the whole.
 fn gather(out: &mut Statements, chunk: &mut Chunk, lines: u32) {
     let geometry = &mut out.geometry;
     let library = |(line, name): (u32, String)| (line.saturating_add(lines), name);
@@ -147,7 +147,7 @@ fn gather(out: &mut Statements, chunk: &mut Chunk, lines: u32) {
     out.odd.append(std::mem::take(&mut chunk.odd), lines);
 }
 
-/// Names and runs of the whole text.
+/// Interned names and runs of the whole text.
 struct Table {
     names: Vec<String>,
     name_ids: HashMap<String, u32>,
@@ -165,8 +165,8 @@ impl Table {
         }
     }
 
-    /// The number in the whole of each run of a chunk; `last` is what the faces before it were in, and becomes that of its
-    /// own last ones.
+    /// Number in the whole text of each run of a chunk. `last` is the run of the faces before the chunk, and becomes that of
+    /// its last faces.
     fn take(&mut self, chunk: &mut Chunk, last: &mut Run) -> Vec<u32> {
         let names: Vec<u32> = std::mem::take(&mut chunk.names).into_iter().map(|name| self.name(name)).collect();
         let known = |id: u32, open: u32| if id == OPEN { open } else { names[id as usize] };
@@ -210,7 +210,7 @@ fn all_colors(chunks: &[Chunk], begins: &[Before], positions: u32) -> Vec<[f32; 
     all
 }
 
-/// What comments say of the colours of so many vertices; nothing where they say nothing.
+/// Colours of vertices from ZBrush's comments; empty where there are none.
 fn painted(chunks: &[Chunk], positions: u32) -> Vec<[f32; 3]> {
     let mut paint = chunks.iter().flat_map(|chunk| &chunk.paint).peekable();
     if paint.peek().is_none() {
@@ -229,7 +229,7 @@ fn vertices(chunks: &mut [Chunk]) -> (Vec<DVec3>, Vec<DVec2>, Vec<Vec3>) {
     (positions, uvs, normals)
 }
 
-/// What corners may name.
+/// Vertex data that corners may name.
 struct There<'a> {
     counts: [u32; 3],
     uvs: &'a [DVec2],
@@ -237,12 +237,12 @@ struct There<'a> {
 }
 
 impl There<'_> {
-    /// The corner, and whether it names something that is not there.
+    /// The corner, and whether it names a vertex, coordinate or normal that does not exist.
     #[inline]
     fn corner(&self, numbers: &[u32; 3], before: &Before) -> (Corner, bool) {
         let number = |kind: usize| resolve(numbers[kind], before.counts[kind]).filter(|&n| n <= self.counts[kind]);
         let [position, uv, normal] = [number(0), number(1), number(2)];
-        // 0 is none.
+        // 0 means none.
         let index = |number: Option<u32>| number.map_or(NONE, |n| n.wrapping_sub(1));
         let (uv_index, normal_index) = (index(uv), index(normal));
         let is_finite = self.uvs.get(uv_index as usize).is_some_and(|uv| uv.is_finite());
@@ -256,7 +256,7 @@ impl There<'_> {
     }
 }
 
-/// Takes over points and lines; their corners. What names a vertex that is not there is counted and left out.
+/// Moves points and lines to the whole and returns their corners. Those that name a missing vertex are counted and left out.
 fn wire_statements(
     chunks: &[Chunk],
     begins: &[Before],
@@ -285,9 +285,9 @@ fn wire_statements(
     corners
 }
 
-/// The corners of all faces, and whether one of them, or of the faces that were dropped, names what is not there.
+/// Corners of all faces, and whether one of them, or of the dropped faces, names data that does not exist.
 fn corners(chunks: &[Chunk], begins: &[Before], there: &There) -> (Vec<Corner>, bool) {
-    // Its pages are made by the threads that write there.
+    // The threads that fill the parts are the ones that touch the pages first.
     let mut all: Vec<Corner> = bytemuck::zeroed_vec(chunks.iter().map(|c| c.corners.len()).sum());
     let parts = cut(&mut all, chunks.iter().map(|chunk| chunk.corners.len()));
     let fill = |((part, chunk), before): ((&mut [Corner], &Chunk), &Before)| {

@@ -1,11 +1,11 @@
 //! Wavefront OBJ and MTL -> scene.
 //!
-//! The text goes through `statements` (lines, numbers, names, faces; every error with its line), which leave the
+//! The text becomes `statements` (lines, numbers, names, faces; every error with its line), which hold the
 //! geometry of the file (`load::geometry`): vertices, faces, points and lines in runs of one object, group and material.
 //!
 //! What the text leaves open is decided so: faces without normals are flat unless a smoothing group says otherwise;
 //! vertex colours are sRGB-coded, MTL colours linear; the fourth number of a vertex is a weight for rational curves and
-//! ignored; every surface is seen from both sides; a face whose normals point to its back is turned round.
+//! ignored; every surface is seen from both sides; a face whose normals point to its back is flipped.
 
 mod chunk;
 mod faults;
@@ -20,10 +20,10 @@ use super::mtl;
 use super::text::encoding::to_ascii_superset;
 use super::{LoadError, LoadOptions, Loaded, Source, Warnings};
 
-/// Loads an OBJ file and the MTL files and pictures it names; whatever that takes comes out of `budget`.
+/// Loads an OBJ file and the MTL files and pictures it names; its memory is taken from `budget`.
 ///
 /// # Errors
-/// When a face refers to what is not there, or when it would take more than is left. A file without faces is an empty
+/// When a face names data that does not exist, or when loading would exceed the budget. A file without faces is an empty
 /// scene.
 pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
     let file = source.path.as_path();

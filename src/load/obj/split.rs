@@ -1,6 +1,6 @@
-//! A text -> runs of whole logical lines.
+//! Splits a text into runs of whole logical lines.
 
-/// Cuts `text` into runs of about `size` bytes; each ends behind a line end that nothing continues.
+/// Cuts `text` into runs of about `size` bytes; each ends behind a line end that is not continued.
 pub(super) fn runs(text: &[u8], size: usize) -> Vec<&[u8]> {
     let mut runs = Vec::with_capacity(text.len() / size.max(1) + 1);
     let mut rest = text;
@@ -14,9 +14,9 @@ pub(super) fn runs(text: &[u8], size: usize) -> Vec<&[u8]> {
     runs
 }
 
-/// The first place after `from` where a line starts that stands for itself; only LF counts as a line end here.
+/// First position after `from` where a line starts that continues no other; only LF counts as a line end here.
 fn end_of_line(text: &[u8], from: usize) -> Option<usize> {
-    // A backslash as the last sign before a line end, whatever blank lines lie between, may join the next line.
+    // A backslash as the last character before a line end, regardless of blank lines in between, may continue the line.
     let mut last = text[..from].trim_ascii_end().last();
     for (at, byte) in text.iter().enumerate().skip(from) {
         match byte {

@@ -1,9 +1,9 @@
-//! OBJ text -> checked statements: vertices, faces with the corners they name, and everything that stands between them
+//! OBJ text -> checked statements: vertices, faces with the corners they name, and the state between them
 //! (names, materials, smoothing groups, colours).
 //!
-//! The text is cut into runs of whole lines (`split`), which are read side by side (`chunk`) and joined as if they had
-//! been read one after another (`join`). The text's own errors end here, with their line (`faults`): after this nothing
-//! refers to what is not there.
+//! The text is cut into runs of whole lines (`split`), which are read in parallel (`chunk`) and joined as if they had
+//! been read in sequence (`join`). The text's own errors are reported here, with their line (`faults`): later stages
+//! see valid indices only.
 
 use super::chunk::{self, Chunk};
 use super::join::{Joined, join};
@@ -19,7 +19,7 @@ use std::mem::size_of;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// How often something odd was met, and where first.
+/// Number of occurrences of an oddity, and the first of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tally {
     pub count: u32,
@@ -28,7 +28,7 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Adds what was met further on, `lines` lines before which there are.
+    /// Adds occurrences from further on, where `lines` lines precede.
     fn append(&mut self, more: Self, lines: u32) {
         if self.count == 0 && more.count > 0 {
             (self.line, self.word) = (more.line.saturating_add(lines), more.word);
@@ -45,7 +45,7 @@ impl Tally {
     }
 }
 
-/// Odd things, counted.
+/// Counts of oddities.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Oddities {
     pub wire_statements: Tally,
@@ -68,7 +68,7 @@ pub(super) struct Oddities {
     absent: Tally,
 }
 
-/// A whole file's statements.
+/// The statements of a whole file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Statements {
     pub geometry: Geometry,
@@ -78,12 +78,12 @@ pub(super) struct Statements {
 /// Reads the whole text.
 ///
 /// # Errors
-/// When a face names what is not there, or its corners cannot be read, or the memory this takes is over the budget.
+/// When a face names data that does not exist, its corners cannot be read, or memory would exceed the budget.
 pub(super) fn read(text: &[u8], file: &Path, budget: &mut Budget) -> Result<Statements, LoadError> {
     read_in_runs(text, RUN, file, budget)
 }
 
-/// Bytes of a run of lines: enough to keep a thread busy, few enough for all threads to end together.
+/// Bytes of a run of lines: enough to keep a thread busy, few enough that all threads end together.
 const RUN: usize = 1 << 18;
 
 fn read_in_runs(text: &[u8], run: usize, file: &Path, budget: &mut Budget) -> Result<Statements, LoadError> {
@@ -109,11 +109,11 @@ fn read_in_runs(text: &[u8], run: usize, file: &Path, budget: &mut Budget) -> Re
     Ok(statements)
 }
 
-/// Bytes of a point: its vertex, and the numbers of what would be the ends of a line.
+/// Bytes of a point: its vertex, and the numbers of the two ends of a line.
 const POINT: u64 = 48;
 
 impl Statements {
-    /// Whether nothing joins vertices, nor was meant to: then they are points, as scanners write them.
+    /// Whether no statement joins vertices or was meant to: then they are points, as scanners write them.
     fn is_cloud(&self) -> bool {
         let odd = &self.odd;
         let others = [&odd.wire_statements, &odd.curves, &odd.calls, &odd.few_corners, &odd.absent];
@@ -125,7 +125,7 @@ impl Statements {
     }
 }
 
-/// Reads every run; stops soon after the memory taken is over the budget, from which it is taken.
+/// Reads every run in parallel; stops soon after the memory exceeds the budget.
 fn read_side_by_side(runs: &[&[u8]], budget: &mut Budget) -> Result<Vec<Chunk>, OverBudget> {
     let taken = AtomicU64::new(0);
     let most = *budget;
@@ -141,7 +141,7 @@ fn read_side_by_side(runs: &[&[u8]], budget: &mut Budget) -> Result<Vec<Chunk>, 
     Ok(chunks)
 }
 
-/// Bytes that a run takes until it has become a part of a mesh.
+/// Bytes that a run takes until it has become part of a mesh.
 fn bytes(chunk: &Chunk) -> u64 {
     /// A face, and its number in the mesh.
     const FACE: u64 = 24 + 4;
@@ -151,7 +151,7 @@ fn bytes(chunk: &Chunk) -> u64 {
     const CORNER: u64 = 12 + 12 + 12 + 16;
     /// Twice in `f64`, then in `f32`, and in the mesh.
     const VERTEX: u64 = 2 * 24 + 12 + 12;
-    /// A name, four times with its place in a table: in the run of lines and in the whole.
+    /// Four times a name with its table entry: in the run of lines and in the whole.
     const NAME: u64 = 4 * 56;
     /// A mesh and its instance, or points and lines, with a few lists of their own.
     const RUN: u64 =
@@ -162,7 +162,7 @@ fn bytes(chunk: &Chunk) -> u64 {
     let faces = chunk.face_count as usize + chunk.wire_statements.len();
     let texts = chunk.names.iter().chain(chunk.libraries.iter().map(|(_, names)| names));
     let names: u64 = texts.map(|name| NAME + 4 * name.len() as u64).sum();
-    // One of its own each may have.
+    // Each may have a material of its own.
     let materials = chunk.runs.iter().filter(|run| run.material.is_some()).count() * size_of::<Material>();
     let runs = chunk.runs.len() as u64 * RUN + materials as u64;
     faces as u64 * FACE
@@ -174,7 +174,7 @@ fn bytes(chunk: &Chunk) -> u64 {
 }
 
 impl Oddities {
-    /// Adds what was met further on, `lines` lines before which there are.
+    /// Adds oddities from further on, where `lines` lines precede.
     pub(super) fn append(&mut self, more: Self, lines: u32) {
         self.wire_statements.append(more.wire_statements, lines);
         self.curves.append(more.curves, lines);
@@ -191,7 +191,7 @@ impl Oddities {
         self.zero.append(more.zero, lines);
     }
 
-    /// One warning for each kind met.
+    /// Adds one warning for each kind of oddity.
     pub(super) fn warn(&self, file: &Path, warnings: &mut Warnings) {
         let mut warn = |code, tally: &Tally, text: String, remedy: &str| {
             if tally.count > 0 {
@@ -250,7 +250,7 @@ mod tests {
         read(text.as_bytes(), Path::new("m.obj"), &mut Budget::new(&Limits { memory, ..Limits::default() }))
     }
 
-    /// With all faces and their corners.
+    /// Statements with faces and corners written out, also for plain triangles.
     fn of(text: &str) -> Statements {
         let mut statements = read_with(text, u64::MAX).unwrap();
         if !statements.geometry.triangles.is_empty() {
@@ -316,7 +316,7 @@ mod tests {
         let text = "m.obj:6: a corner names texture coordinate 0, but numbers start at 1; it is drawn without (×5)";
         assert_eq!(told, [text]);
         assert!(fault(&format!("{TRIANGLE}f 1/0 0/0 3/0")).contains("corner 2 of the face names vertex 0"));
-        // Beside numbers of what is not there at all, for which the text is looked through again.
+        // Beside numbers of missing data, which trigger another pass over the text.
         assert_eq!(of(&format!("{TRIANGLE}f 1/0/1 2/0/1 3/0/1")).odd.absent.count, 3);
     }
 
@@ -394,7 +394,7 @@ mod tests {
         let text = format!("{TRIANGLE}f 1 2 3");
         assert!(read_with(&text, 200).unwrap_err().to_string().contains("--max-memory"));
         assert!(read_with(&text, 10_000).is_ok());
-        // Groups without faces leave names, those with faces meshes.
+        // Groups without faces leave names, those with faces leave meshes.
         let empty: String = (0..1000).map(|i| format!("g {i}\n")).collect();
         let full: String = (0..1000).map(|i| format!("g {i}\nf 1 2 3\n")).collect();
         for (groups, memory) in [(empty, 200_000), (full, 800_000)] {
@@ -429,7 +429,7 @@ mod tests {
         read_in_runs(text.as_bytes(), run, Path::new("m.obj"), &mut budget).unwrap()
     }
 
-    /// Triangles of which nothing is said, with blank lines and comments between them, and some that count back.
+    /// Plain triangles, with blank lines and comments between them, some with numbers that count back.
     fn plain_triangles() -> String {
         let faces = (0..40).map(|i| match i % 9 {
             3 => "f 3 1 4\n\n".into(),
@@ -445,7 +445,7 @@ mod tests {
         let text = plain_triangles();
         for run in [1 << 30, 1, 20, 77] {
             let mut plain = in_runs(&text, run);
-            // A coordinate that no corner names is enough.
+            // One texture coordinate is enough, even if no corner names it.
             let spelt = in_runs(&format!("{text}vt 0 0\n"), run);
             assert_eq!((plain.geometry.triangles.len(), spelt.geometry.triangles.len()), (40, 0));
             assert!(plain.geometry.faces.is_empty() && plain.geometry.soup.corners.is_empty());
@@ -457,7 +457,7 @@ mod tests {
 
     #[test]
     fn a_line_that_cannot_be_read_after_all_leaves_no_corner() {
-        // What it names besides vertices is seen before what is wrong with it.
+        // The corners that name more than vertices come before the invalid one.
         let s = of(&format!("{TRIANGLE}vt 0 0\nf 1 2 3\nf 3 2 1/1 \\\n1\nf 2 3"));
         assert_eq!(corners(&s), [[1, 0, 0], [2, 0, 0], [3, 0, 0], [3, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0]]);
         assert!(fault(&format!("{TRIANGLE}vt 0 0\nf 1 2 3\nf 1 2 3/1 x")).contains("corner 4 of the face is 'x'"));

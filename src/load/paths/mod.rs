@@ -1,8 +1,8 @@
-//! Which files a model may name, and which were read.
+//! Which files a model may name, and which files were read.
 //!
-//! A glTF or MTL names other files, and whoever wrote it is not trusted: files are read only below a root folder, after
-//! symbolic links are resolved, and never from a network. Everything read is listed and hashed, so that a picture can
-//! say exactly what it was made from.
+//! A glTF or MTL names other files, and its author is not trusted: files are read only below a root folder, after
+//! symbolic links are resolved, and never from a network. Every file read is listed and hashed, so that a picture can
+//! record exactly what it was made from.
 
 #[cfg(test)]
 mod tests;
@@ -23,9 +23,9 @@ use xxhash_rust::xxh3::xxh3_128;
 /// A file that was read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileRead {
-    /// As it was named, from the folder of the model as that was.
+    /// Path as named, relative to the folder of the model as the user named it.
     pub path: PathBuf,
-    /// xxh3-128 of its bytes.
+    /// xxh3-128 of the file's bytes.
     pub hash: u128,
 }
 
@@ -38,42 +38,42 @@ impl AsRef<Path> for FileRead {
 /// Reads the files that a model names.
 #[derive(Clone, Debug)]
 pub struct Resolver {
-    /// Where all that is named lies.
+    /// Where all named files lie.
     volume: Volume,
-    /// Whether the model is standard input, which lies nowhere.
+    /// Whether the model is standard input, which has no folder.
     from_stdin: bool,
     /// Folder that relative names start from; canonical.
     base: PathBuf,
-    /// The folder as the user named it.
+    /// The base folder as the user named it.
     named: PathBuf,
-    /// Nothing outside this folder is read; canonical.
+    /// Folder outside of which nothing is read; canonical.
     root: PathBuf,
     /// Limits of each file.
     limits: Limits,
-    /// Each with what it counts for in the hash of all.
+    /// Files read, each with the hash that it contributes to the total hash.
     read: Vec<(FileRead, u128)>,
-    /// Canonical path -> index into `read`.
+    /// Index into `read`, by canonical path.
     known: HashMap<PathBuf, usize>,
-    /// What lies in the folders that were looked through for a name in another case: names by their small letters.
+    /// Entries of the folders searched for a name in another case, by lower-case name.
     listed: HashMap<PathBuf, HashMap<String, String>>,
     reading: Spent,
-    /// Whether anything was looked for where it was not.
+    /// Whether a file was missing at a path where it was looked up.
     gaps: Cell<bool>,
 }
 
-/// A file that was read.
+/// A file found and read.
 #[derive(Debug)]
 pub struct Found {
     /// Path relative to the model's folder, or absolute.
     pub path: PathBuf,
-    /// What it holds.
+    /// Contents of the file.
     pub bytes: Vec<u8>,
     /// Whether it lies elsewhere than its name says.
     pub guessed: bool,
 }
 
 impl Found {
-    /// A note that the file lies elsewhere than `name` says, about `place` in `file`.
+    /// Diagnostic that the file lies elsewhere than `name` says, at `place` in `file`.
     pub fn note(&self, name: &str, file: &Path, place: &str) -> Option<Diagnostic> {
         self.guessed.then(|| Diagnostic::new("file-elsewhere", file, place, taken_from(name, &self.path)))
     }
@@ -82,76 +82,76 @@ impl Found {
 /// Why a named file was not read.
 #[derive(Debug, thiserror::Error)]
 pub enum FileFault {
-    /// It lies outside the root.
+    /// The file lies outside the root.
     #[error("'{name}' lies outside {within}, where nothing is read")]
     Outside {
-        /// As written in the model.
+        /// Name as written in the model.
         name: String,
-        /// What it lies outside of, in words.
+        /// The folder that it lies outside of, in words.
         within: String,
-        /// The `--root` that would allow it; `None` where names start from the root.
+        /// Value of `--root` that would allow it; `None` where names are relative to the root.
         root: Option<PathBuf>,
     },
-    /// It lies outside the archive of the model.
+    /// The file lies outside the archive of the model.
     #[error("'{0}' lies outside the archive, and nothing else is read")]
     OutsideArchive(String),
-    /// There is no such file.
+    /// The file does not exist.
     #[error("'{0}' is not there")]
     Missing(String),
-    /// There is none in the archive of the model.
+    /// The file does not exist in the archive of the model.
     #[error("'{0}' is not in the archive")]
     MissingInArchive(String),
-    /// It is a folder, a device or the like.
+    /// The path is that of a folder, a device or the like.
     #[error("'{0}' is not a plain file")]
     NotAFile(String),
-    /// It is larger than [`super::Limits::file`].
+    /// The file is larger than [`super::Limits::file`].
     #[error("'{name}' has {bytes} bytes where {limit} are allowed")]
     TooLarge {
-        /// As written in the model.
+        /// Name as written in the model.
         name: String,
-        /// Its size.
+        /// Size of the file.
         bytes: u64,
         /// The limit.
         limit: u64,
-        /// What lets it in, if anything does.
+        /// Remedy, if there is one.
         remedy: &'static str,
     },
-    /// The name is a URI of another machine or an unknown scheme.
+    /// The name is a URI of another machine or of an unknown scheme.
     #[error("'{0}' is not a relative file name, and nothing is fetched from elsewhere")]
     Scheme(String),
     /// The name cannot be a URI or file name.
     #[error("'{0}' is not a valid URI")]
     BadUri(String),
-    /// The system refused.
+    /// I/O error.
     #[error("'{name}': {source}")]
     Io {
-        /// As written in the model.
+        /// Name as written in the model.
         name: String,
-        /// What the system said.
+        /// The error of the system.
         source: io::Error,
     },
-    /// The archive that it lies in does not give it.
+    /// The archive that holds the file cannot unpack it.
     #[error("'{name}' cannot be unpacked: {fault}")]
     Packed {
-        /// As written in the model.
+        /// Name as written in the model.
         name: String,
-        /// Why.
+        /// Reason.
         fault: String,
-        /// What helps.
+        /// Remedy.
         remedy: &'static str,
     },
 }
 
 impl FileFault {
-    /// The code of a file that is not there.
+    /// Diagnostic code for a missing file.
     pub const MISSING: &str = "file-missing";
 
-    /// Whether there is no such file.
+    /// Whether the fault is that the file does not exist.
     pub fn is_missing(&self) -> bool {
         matches!(self, Self::Missing(_) | Self::MissingInArchive(_))
     }
 
-    /// What was said of a file when it was looked for or read: by the system, or of the archive that it lies in.
+    /// Fault for an error while a file was located or read: of the system, or of its archive.
     fn of(name: String, source: io::Error) -> Self {
         match ArchiveFault::of(&source) {
             Some(why) => Self::Packed { name, fault: why.to_string(), remedy: why.remedy() },
@@ -159,7 +159,7 @@ impl FileFault {
         }
     }
 
-    /// This fault as a message about `place` in `file`.
+    /// Diagnostic for this fault at `place` in `file`.
     pub fn diagnose(&self, file: &Path, place: &str) -> Diagnostic {
         let (code, remedy) = match self {
             Self::Outside { root: Some(root), .. } => {
@@ -190,10 +190,10 @@ impl FileFault {
 }
 
 impl Resolver {
-    /// A resolver for what `source` names; `source` itself is the first file read.
+    /// Resolver for the files that `source` names; `source` itself is the first file read.
     ///
     /// Relative names start from the folder of `source`; where `source` has none (standard input), from the root, or
-    /// else from the current folder. Of an archive the archive is the root.
+    /// else from the current folder. For a model in an archive, the archive is the root.
     pub fn new(source: &Source, options: &LoadOptions) -> Self {
         let current = || PathBuf::from(".");
         let folder = source.path.parent().filter(|p| !p.as_os_str().is_empty());
@@ -204,7 +204,7 @@ impl Resolver {
         };
         let named = if folder.is_none() && base == current() { PathBuf::new() } else { base.clone() };
         let volume = source.within.clone().map_or(Volume::Disk, Volume::Archive);
-        // Wherever it is.
+        // Canonical, regardless of the root.
         let whole = |path: &PathBuf| volume.canonical(path, Path::new("")).unwrap_or_else(|_| path.clone());
         let base = whole(&base);
         let root = match (&source.within, &options.root) {
@@ -230,26 +230,26 @@ impl Resolver {
         resolver
     }
 
-    /// Reads a file that a URI reference (RFC 3986) names: percent escapes are decoded, schemes refused.
+    /// Reads a file named by a URI reference (RFC 3986): percent escapes are decoded, schemes refused.
     ///
-    /// `data:` URIs are not for this.
+    /// `data:` URIs are handled elsewhere.
     pub fn read_uri(&mut self, uri: &str) -> Result<Found, FileFault> {
         let name = file_name_of_uri(uri)?;
         let (path, guessed) = self.find(&name, uri)?;
         Ok(Found { bytes: self.read_file(&path)?, path, guessed })
     }
 
-    /// Reads what a URI names, if the file's bytes are left of the budget, from which they are taken before it is read.
+    /// Reads a file named by a URI. Its bytes are taken from the budget before it is read.
     pub fn read_uri_within(&mut self, uri: &str, budget: &mut Budget) -> Result<Result<Found, OverBudget>, FileFault> {
         let name = file_name_of_uri(uri)?;
         let (path, guessed) = self.find(&name, uri)?;
         Ok(self.read_file_within(&path, budget)?.map(|bytes| Found { bytes, path, guessed }))
     }
 
-    /// Where a file is that a URI names, and whether that is a guess.
+    /// Path of a file named by a URI, and whether it is a guess.
     fn find(&mut self, name: &str, uri: &str) -> Result<(PathBuf, bool), FileFault> {
         let slashed = name.replace('\\', "/");
-        // Exporters write names with a literal '%' unescaped, or with another system's slashes, often enough.
+        // Exporters often write names with a literal '%' unescaped, or with another system's slashes.
         for path in [name, uri, &slashed].map(PathBuf::from) {
             match self.locate(&path) {
                 Ok(_) => return Ok((path, false)),
@@ -261,7 +261,7 @@ impl Resolver {
         in_any_case.map(|path| (path, true)).ok_or_else(|| self.missing(Path::new(name)))
     }
 
-    /// That there is no file of this name.
+    /// Fault that there is no file of this name.
     pub(super) fn missing(&self, name: &Path) -> FileFault {
         match self.volume {
             Volume::Disk => FileFault::Missing(shown(name)),
@@ -269,7 +269,7 @@ impl Resolver {
         }
     }
 
-    /// The path of an existing plain file below the root that differs from `name` only in the case of letters, be it of
+    /// Path of an existing plain file below the root that differs from `name` only in the case of letters, of
     /// the file or of folders; of several, the first by name.
     pub fn in_any_case(&mut self, name: &Path) -> Option<PathBuf> {
         let mut path = PathBuf::new();
@@ -287,20 +287,20 @@ impl Resolver {
         self.locate(&path).is_ok().then_some(path)
     }
 
-    /// What lies in a folder below the root: names by their small letters.
+    /// Entries of a folder below the root, by lower-case name.
     fn listed(&mut self, folder: &Path) -> Option<&HashMap<String, String>> {
         let folder = self.canonical(folder).ok()?;
         let folder = folder.starts_with(&self.root).then_some(folder)?;
         let list = |folder: &PathBuf| {
             let mut names = self.volume.names_in(folder);
-            // Of names that are the same in small letters, the first is the last to be put in.
+            // Of names equal in lower case, the first by name is inserted last and stays.
             names.sort_unstable_by(|a, b| b.cmp(a));
             names.into_iter().map(|name| (name.to_ascii_lowercase(), name)).collect()
         };
         Some(self.listed.entry(folder).or_insert_with_key(list))
     }
 
-    /// Reads a file named by a path, relative to the model or absolute.
+    /// Reads a file by its path, relative to the model or absolute.
     pub fn read_file(&mut self, name: &Path) -> Result<Vec<u8>, FileFault> {
         let path = self.locate(name)?;
         let watch = Stopwatch::of_this_thread();
@@ -318,7 +318,7 @@ impl Resolver {
         Ok(bytes)
     }
 
-    /// Reads a file by its name, if its bytes are left of the budget, from which they are taken before it is read.
+    /// Reads a file by its path. Its bytes are taken from the budget before it is read.
     pub fn read_file_within(
         &mut self,
         name: &Path,
@@ -331,7 +331,7 @@ impl Resolver {
             return Ok(Err(over));
         }
         let bytes = self.read_file(name)?;
-        // It may have grown meanwhile, or the system does not say how long it is.
+        // The file may have grown since, or its length was unknown.
         Ok(budget.take((bytes.len() as u64).saturating_sub(said), 1).map(|()| bytes))
     }
 
@@ -346,29 +346,29 @@ impl Resolver {
         }
     }
 
-    /// Whether what is named so lies in the folder of a file that [`Self::locate`] has found.
+    /// Whether the folder of `named` is that of a file that [`Self::locate`] has found.
     pub(super) fn lies_beside(&self, named: &Path, canonical: &Path) -> bool {
         let folder = named.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         self.volume.canonical(folder, &self.root).is_ok_and(|folder| canonical.parent() == Some(&*folder))
     }
 
-    /// A file as it is named, from the folder of the model as that was.
+    /// Path of a file relative to the folder of the model as the user named it.
     pub fn as_named(&self, name: &Path) -> PathBuf {
         self.named.join(name)
     }
 
-    /// Time that reading named files has taken.
+    /// Time spent on reading named files.
     pub fn reading(&self) -> Spent {
         self.reading
     }
 
-    /// Nothing outside this folder is read; canonical.
+    /// Folder outside of which nothing is read; canonical.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// The canonical path of an existing plain file below the root: opening anything else, such as a pipe, could wait
-    /// for ever.
+    /// Canonical path of an existing plain file below the root. Other files are refused: opening a pipe, for example, could
+    /// wait for ever.
     pub fn locate(&self, name: &Path) -> Result<PathBuf, FileFault> {
         let shown = shown(name);
         if name.as_os_str().is_empty() || name.as_os_str().as_encoded_bytes().contains(&0) {
@@ -386,7 +386,7 @@ impl Resolver {
                 Err(source) => Err(FileFault::of(shown, source)),
             },
             Ok(path) => Err(outside(&path)),
-            // Whether a file outside the root exists is nobody's business.
+            // Do not reveal whether a file outside the root exists.
             Err(_) if self.volume.leads_out(&wanted, &self.root) => Err(outside(&lexical(&wanted))),
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
                 self.gaps.set(true);
@@ -396,12 +396,12 @@ impl Resolver {
         }
     }
 
-    /// The one path of what is there under a name.
+    /// Canonical path of an existing file.
     fn canonical(&self, name: &Path) -> io::Result<PathBuf> {
         self.volume.canonical(&self.base.join(name), &self.root)
     }
 
-    /// What is told of a file outside the root.
+    /// Fault for a file outside the root.
     fn outside(&self, name: String, path: &Path) -> FileFault {
         FileFault::Outside {
             name,
@@ -413,7 +413,7 @@ impl Resolver {
         }
     }
 
-    /// Bytes of a file that [`Self::locate`] has found; 0 where the system does not say.
+    /// Length in bytes of a file that [`Self::locate`] has found; 0 where unknown.
     pub fn length(&self, canonical: &Path) -> u64 {
         self.volume.length(canonical)
     }
@@ -434,15 +434,15 @@ impl Resolver {
         self.read.extend(rest);
     }
 
-    /// Every file read, in the order first read, and the xxh3-128 of their xxh3-128 hashes (little-endian) in that
-    /// order, and whether any was looked for where it was not.
+    /// All files read, in the order first read; the xxh3-128 of their xxh3-128 hashes (little-endian) in that
+    /// order; and whether a file was missing at a path where it was looked up.
     pub fn finish(self) -> (Vec<FileRead>, u128, bool) {
         let hashes: Vec<u8> = self.read.iter().flat_map(|(_, counted)| counted.to_le_bytes()).collect();
         (self.read.into_iter().map(|(file, _)| file).collect(), xxh3_128(&hashes), self.gaps.get())
     }
 }
 
-/// The file name that a relative URI reference stands for.
+/// File name of a relative URI reference.
 fn file_name_of_uri(uri: &str) -> Result<String, FileFault> {
     let scheme = uri.split_once(':').map(|(scheme, _)| scheme);
     let is_scheme = |s: &str| {
@@ -458,32 +458,32 @@ fn file_name_of_uri(uri: &str) -> Result<String, FileFault> {
     percent_decode_str(uri).decode_utf8().map(|s| s.into_owned()).map_err(|_| FileFault::BadUri(shorten(uri)))
 }
 
-/// Whether a name begins with the letter of a drive, as other systems' do.
+/// Whether a name begins with a drive letter, as on other systems.
 fn is_on_a_drive(name: &str) -> bool {
     let mut chars = name.chars();
     chars.next().is_some_and(|letter| letter.is_ascii_alphabetic()) && chars.next() == Some(':')
 }
 
-/// A file name in messages: whole, unless no system has names so long.
+/// File name for messages: whole, unless it is longer than any system allows.
 pub(crate) fn shown(name: &Path) -> String {
     const LONGEST: usize = 255;
     let name = name.to_string_lossy();
     if name.chars().nth(LONGEST).is_some() { shorten(&name) } else { name.into_owned() }
 }
 
-/// That a file lies elsewhere than its name says.
+/// Message that a file lies elsewhere than its name says.
 pub(crate) fn taken_from(name: &str, path: &Path) -> String {
     format!("'{}' is taken from '{}'", shorten(name), path.display())
 }
 
-/// The beginning of a text that may be megabytes long.
+/// Beginning of a text that may be megabytes long.
 pub(crate) fn shorten(text: &str) -> String {
     const KEPT: usize = 80;
     if text.chars().nth(KEPT).is_none() { text.into() } else { text.chars().take(KEPT).chain(['…']).collect() }
 }
 
-/// `path` with `.` and `..` taken out by text alone; above a root there is nothing, and `..` that lead out of a relative path
-/// stay.
+/// Resolves `.` and `..` in `path` by text alone; `..` at a root stays at the root, and `..` that lead out of a relative path
+/// are kept.
 pub(crate) fn lexical(path: &Path) -> PathBuf {
     let mut clean = PathBuf::new();
     for part in path.components() {
@@ -498,7 +498,7 @@ pub(crate) fn lexical(path: &Path) -> PathBuf {
     clean
 }
 
-/// The innermost folder that holds both.
+/// Innermost folder that holds both.
 fn common_folder(folder: &Path, file: &Path) -> PathBuf {
     let both = folder.components().zip(file.parent().unwrap_or(file).components());
     both.take_while(|(a, b)| a == b).map(|(a, _)| a).collect()

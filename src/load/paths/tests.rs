@@ -1,4 +1,4 @@
-//! Which files are found, and which are not.
+//! Which files are found, and which are refused.
 
 use super::*;
 use std::fs;
@@ -50,7 +50,7 @@ fn slashes_of_another_system_lead_to_files_and_not_out_of_the_root() {
 fn files_outside_the_root_are_refused_with_the_root_that_would_work() {
     let dir = folder();
     let secret = dir.path().join("secret.bin").to_string_lossy().into_owned();
-    // With the letter of a drive it would be a URI of another kind.
+    // With a drive letter it would be a URI with a scheme.
     let absolute = Some(secret.as_str()).filter(|_| !cfg!(windows));
     for name in ["../secret.bin", "..%2Fsecret.bin", "../no-such-file"].into_iter().chain(absolute) {
         let fault = resolver(dir.path(), &LoadOptions::default()).read_uri(name).unwrap_err();
@@ -71,7 +71,7 @@ fn of_standard_input_no_root_lets_names_out_and_none_is_advised() {
     assert!(fault.diagnose(Path::new("-"), "").remedy.contains("instead of standard input"));
 }
 
-// Where names in another case are other files.
+// Only where file names are case-sensitive.
 #[cfg(target_os = "linux")]
 #[test]
 fn files_and_folders_are_found_in_another_case_below_the_root_alone() {

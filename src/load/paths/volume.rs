@@ -1,4 +1,4 @@
-//! Where the files of a model lie: on disk, or in the archive that it is read from.
+//! Where the files of a model lie: on disk, or in the archive that the model is read from.
 
 use super::lexical;
 use crate::load::archive::{Archive, in_archive, opened, split};
@@ -8,12 +8,12 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Names in one folder that are looked at; bounds the time.
+/// Largest number of names that are listed from one folder; bounds the time.
 const LISTED: usize = 10_000;
 
 #[derive(Clone, Debug)]
 pub(super) enum Volume {
-    /// With what lies in archives there, if their paths are named.
+    /// The disk, including files in archives whose path is named.
     Disk,
     Archive(Arc<Archive>),
 }
@@ -22,7 +22,7 @@ pub(super) enum Volume {
 #[derive(Debug)]
 pub(super) enum Unread {
     NotAFile,
-    /// It has so many bytes.
+    /// The file has this many bytes.
     TooLarge(u64),
     Io(io::Error),
 }
@@ -34,8 +34,8 @@ impl From<io::Error> for Unread {
 }
 
 impl Volume {
-    /// The one path of a file or folder that is there; an archive knows no links. Archives outside the root are not looked into,
-    /// whatever is in them.
+    /// Canonical path of an existing file or folder; archives have no links. Archives outside the root are not opened, whatever
+    /// they hold.
     pub(super) fn canonical(&self, path: &Path, root: &Path) -> io::Result<PathBuf> {
         match self {
             Self::Disk => match path.canonicalize() {
@@ -50,7 +50,7 @@ impl Volume {
         }
     }
 
-    /// Whether a path leads out of the root, whatever is there.
+    /// Whether a path leads out of the root, by its text alone.
     pub(super) fn leads_out(&self, path: &Path, root: &Path) -> bool {
         match self {
             Self::Disk => !lexical(path).starts_with(root),
@@ -58,7 +58,7 @@ impl Volume {
         }
     }
 
-    /// Whether something that is there is a plain file.
+    /// Whether an existing path is a plain file.
     pub(super) fn is_file(&self, canonical: &Path) -> io::Result<bool> {
         match self.within(canonical)? {
             None => fs::metadata(canonical).map(|meta| meta.is_file()),
@@ -66,7 +66,7 @@ impl Volume {
         }
     }
 
-    /// Bytes of a file; 0 where nobody says.
+    /// Length of a file in bytes; 0 where unknown.
     pub(super) fn length(&self, canonical: &Path) -> u64 {
         match self.within(canonical) {
             Ok(Some((archive, name))) => archive.length(name).unwrap_or(0),
@@ -74,13 +74,13 @@ impl Volume {
         }
     }
 
-    /// The names of what lies in a folder.
+    /// Names of the entries of a folder.
     pub(super) fn names_in(&self, canonical: &Path) -> Vec<String> {
         let listed = |archive: &Archive, name| archive.names_in(name).take(LISTED).map(str::to_owned).collect();
         if let Ok(Some((archive, name))) = self.within(canonical) {
             return listed(&archive, name);
         }
-        // An archive is a folder, too, where something in it is named.
+        // A path into an archive treats it as a folder.
         if canonical.is_file() {
             return opened(canonical).ok().flatten().map_or_else(Vec::new, |archive| listed(&archive, Path::new("")));
         }
@@ -88,7 +88,7 @@ impl Volume {
         entries.filter_map(|entry| entry.file_name().into_string().ok()).collect()
     }
 
-    /// Reads a plain file of at most so many bytes.
+    /// Reads a plain file of at most `most` bytes.
     pub(super) fn read(&self, canonical: &Path, most: u64) -> Result<Vec<u8>, Unread> {
         if let Some((archive, name)) = self.within(canonical)? {
             return archive.read(name, most).map_err(|error| match error.kind() {
@@ -104,12 +104,12 @@ impl Volume {
         if meta.len() > most {
             return Err(Unread::TooLarge(meta.len()));
         }
-        // What other threads would do meanwhile is not in this one's time.
+        // Sequential, so that the thread's measured time holds no other work.
         let bytes = whole::read_in_turn(file, meta.len(), most)?;
         if bytes.len() as u64 > most { Err(Unread::TooLarge(bytes.len() as u64)) } else { Ok(bytes) }
     }
 
-    /// The archive that something lies in, and its name there; `None` if it lies on disk.
+    /// Archive that holds the file, and its name there; `None` if it lies on disk.
     fn within<'p>(&self, canonical: &'p Path) -> io::Result<Option<(Arc<Archive>, &'p Path)>> {
         match self {
             Self::Disk => in_archive(canonical),
@@ -121,12 +121,13 @@ impl Volume {
     }
 }
 
-/// Whether that nothing is found may mean that a path leads through a file.
+/// Whether an error may mean that a path leads through a file.
 fn may_lead_into_a_file(error: &io::Error) -> bool {
     error.kind() == ErrorKind::NotADirectory || cfg!(windows) && error.kind() == ErrorKind::NotFound
 }
 
-/// The one path of what lies in an archive on disk, or would lie in one outside the root; `None` where a path leads into none.
+/// Canonical path of a file in an archive on disk, or of one in an archive outside the root, unchecked; `None` for other
+/// paths.
 fn in_file(path: &Path, root: &Path) -> io::Result<Option<PathBuf>> {
     let Some((above, rest)) = split(path) else { return Ok(None) };
     let whole = above.canonicalize()?.join(rest);

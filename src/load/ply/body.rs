@@ -1,4 +1,4 @@
-//! The values of a PLY file, one after another, as text or as bytes.
+//! Reads the values of a PLY file in sequence, as text or binary.
 
 use super::header::{Element, Encoding, Header, Kind};
 use super::packed::Packed;
@@ -8,30 +8,30 @@ use crate::load::text::words::Words;
 use crate::load::{Diagnostic, Source};
 use std::path::Path;
 
-/// Where the reading is. Whole numbers of every kind are exact in `f64`.
+/// Cursor over the values. Integers of every kind are exact in `f64`.
 pub(super) struct Body<'a> {
     file: &'a Path,
-    /// Of a text; elsewhere only where the reading is.
+    /// Words of a text file; for binary files only the position.
     pub words: Words<'a>,
     encoding: Encoding,
 }
 
-/// Why there is no value.
+/// Why a value could not be read.
 pub(super) enum Missing {
-    /// The file ends.
+    /// End of the file.
     End,
-    /// This word is no number.
+    /// A word that is not a number.
     Word(String),
 }
 
 impl<'a> Body<'a> {
-    /// The values behind the header.
+    /// Cursor at the first value, behind the header.
     pub(super) fn new(header: &Header, source: &'a Source) -> Self {
         let words = Words::new(&source.bytes, header.length, header.lines.saturating_add(1));
         Self { file: &source.path, words, encoding: header.encoding }
     }
 
-    /// A fault of the value read last, or of the one that is missing.
+    /// Fault at the value read last, or at the missing one.
     pub(super) fn fault(&self, text: impl Into<String>, remedy: &str) -> Diagnostic {
         let place = match self.encoding {
             Encoding::Text => self.words.line.to_string(),
@@ -40,7 +40,7 @@ impl<'a> Body<'a> {
         Diagnostic::new("ply-body", self.file, place, text).remedy(remedy)
     }
 
-    /// The fault of a missing value: `what` it is.
+    /// Fault for a missing value, which `what` describes.
     pub(super) fn missing(&self, missing: &Missing, what: &str) -> Diagnostic {
         match missing {
             Missing::End => self.fault(format!("the file ends before {what}"), CUT_OFF),
@@ -48,18 +48,17 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// Bytes that a value takes at least.
+    /// Smallest number of bytes of a value.
     pub(super) fn least(&self, kind: Kind) -> u64 {
         if self.encoding == Encoding::Text { 1 } else { kind.size() as u64 }
     }
 
-    /// Bytes that have not been read.
+    /// Number of unread bytes.
     pub(super) fn left(&self) -> u64 {
         self.words.rest().len() as u64
     }
 
-    /// A warning when something follows what the header counts. Blanks do not count, nor does what the last line of a text
-    /// ends with.
+    /// Warning when bytes follow what the header counts; white space behind a text does not count.
     pub(super) fn behind(&self) -> Option<Diagnostic> {
         let rest = self.words.rest();
         let rest = if self.encoding == Encoding::Text { rest.trim_ascii() } else { rest };
@@ -69,7 +68,7 @@ impl<'a> Body<'a> {
         })
     }
 
-    /// Refuses an element that claims more than there are bytes for.
+    /// Refuses an element that claims more than the remaining bytes can hold.
     pub(super) fn check_count(&self, element: &Element) -> Result<(), Diagnostic> {
         let (count, least, left) = (element.count, element.least(self.encoding), self.left());
         if count.checked_mul(least).is_some_and(|bytes| bytes <= left) {
@@ -80,7 +79,7 @@ impl<'a> Body<'a> {
         Err(self.fault(text, CUT_OFF))
     }
 
-    /// The next value.
+    /// Reads the next value.
     #[inline]
     pub(super) fn value(&mut self, kind: Kind) -> Result<f64, Missing> {
         match self.encoding {
@@ -97,7 +96,7 @@ impl<'a> Body<'a> {
         Ok(value)
     }
 
-    /// The line of the next word of a text, and that of the last one; `None` for other files, and behind the last word.
+    /// Lines of the next and of the last word of a text; `None` for binary files, and behind the last word.
     pub(super) fn lines(&mut self) -> Option<[u32; 2]> {
         if self.encoding != Encoding::Text {
             return None;
@@ -106,7 +105,7 @@ impl<'a> Body<'a> {
         self.words.find().then_some([self.words.line, last])
     }
 
-    /// The next word of a text, which must be a number.
+    /// Reads the next word of a text, which must be a number.
     #[inline]
     fn number(&mut self) -> Result<f64, Missing> {
         self.words.number().map_err(|word| match word {
@@ -115,25 +114,25 @@ impl<'a> Body<'a> {
         })
     }
 
-    /// The rows of an element that begins here, where they all take the same bytes ([`Packed::of`]).
+    /// Rows of the element that begins here, if all have the same size ([`Packed::of`]).
     pub(super) fn packed(&self, element: &Element, in_lists: Option<usize>) -> Option<Packed<'a>> {
         Packed::of(element, self.encoding, self.words.rest(), in_lists)
     }
 
-    /// Goes on behind these rows.
+    /// Advances behind these rows.
     pub(super) fn pass_packed(&mut self, rows: &Packed) {
         self.words.at += rows.length();
     }
 
-    /// Passes over `count` values of a binary file, of `size` bytes each; whether there are so many.
+    /// Skips `count` values of `size` bytes each in a binary file; returns whether there are that many.
     fn skip(&mut self, count: u64, size: usize) -> bool {
         let bytes = count.checked_mul(size as u64).filter(|&bytes| bytes <= self.left());
-        // As many bytes as there are in memory.
+        // No more than the bytes in memory, so it fits `usize`.
         self.words.at += bytes.map_or(0, |bytes| bytes as usize);
         bytes.is_some()
     }
 
-    /// Passes over values that nobody asks for.
+    /// Skips values that are not needed.
     pub(super) fn pass(&mut self, count: u64, kind: Kind) -> Result<(), Missing> {
         if self.encoding != Encoding::Text {
             return if self.skip(count, kind.size()) { Ok(()) } else { Err(Missing::End) };

@@ -1,4 +1,4 @@
-//! Files that nobody wrote: whatever comes in, the loader ends with a scene that holds together or with an error.
+//! Arbitrary files: the loader returns a sound scene or an error, whatever the input.
 
 use super::tests::painted::roof;
 use super::tests::{FORMATS, of, square};
@@ -6,7 +6,7 @@ use crate::load::geometry::invariants::assert_sound;
 use crate::load::{LoadOptions, Polygons};
 use proptest::prelude::*;
 
-/// Words that headers are made of, and what breaks them.
+/// Words of headers, and values that break them.
 const WORDS: [&str; 30] = [
     "comment",
     "element",

@@ -20,18 +20,18 @@ use std::path::Path;
 /// Reads every element in the order of the file.
 ///
 /// # Errors
-/// At the first value that is missing or makes no sense, or when memory would exceed the budget.
+/// At the first value that is missing or invalid, or when memory would exceed the budget.
 pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Result<PlainMesh, Diagnostic> {
     let body = Body::new(header, source);
     let vertices = header.element("vertex").map_or(0, |element| element.count);
-    // Each name is kept here, in the header and as that of a material, and stands in paths.
+    // Each name is kept here, in the header and as a material's, and in paths.
     let names: usize = header.pictures.iter().map(|(_, name)| name.len()).sum();
     budget.take(names as u64, 4).map_err(|over| Diagnostic::over_budget(&source.path, over))?;
     let (wanted, bare) = (Wanted::of(header), PlainMesh::showing(header.pictures.clone()));
     let mut reader = Reader { source, body, vertices, wanted, budget, bare, torn: None, odd: Odd::default() };
     for element in &header.elements {
         if let Err(fault) = reader.element(element) {
-            // What makes no sense may come of a line far before it.
+            // An invalid value may result from a malformed line far before it.
             return Err(reader.torn.take().unwrap_or(fault));
         }
     }
@@ -41,7 +41,7 @@ pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Res
     bare.comments.clone_from(&header.comments);
     bare.told.splice(..0, passed_over(header, &source.path));
     bare.told.extend(odd.told(&source.path));
-    // Rows may share lines; where they do by mistake, numbers are left in the end.
+    // Rows may share lines on purpose; where they do by mistake, numbers are left over at the end.
     bare.told.extend(torn.filter(|_| behind.is_some()));
     bare.told.extend(behind);
     bare.told.extend(body.words.respelled.told("ply-number", &source.path));
@@ -51,22 +51,22 @@ pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Res
 struct Reader<'a, 'b> {
     source: &'a Source,
     body: Body<'a>,
-    /// How many vertices the header claims; faces may come before them.
+    /// Number of vertices that the header claims; faces may come before them.
     vertices: u64,
     wanted: Wanted,
     budget: &'b mut Budget,
     bare: PlainMesh,
-    /// A line that has not the numbers of one row.
+    /// Warning about a line whose count of numbers does not match its row.
     torn: Option<Diagnostic>,
     odd: Odd,
 }
 
-/// Faces whose place in a picture is not understood: how many, and the number of the first.
+/// Faces whose texture coordinates or picture are invalid: number of faces, and index of the first.
 #[derive(Default)]
 struct Odd {
-    /// They have not two coordinates for each corner.
+    /// Faces without two coordinates per corner.
     uneven: (u32, u64),
-    /// They name a picture that is not there.
+    /// Faces that name a picture that does not exist.
     no_picture: (u32, u64),
 }
 
@@ -91,7 +91,7 @@ impl Odd {
     }
 }
 
-/// A face as it is read, one after another in the same memory.
+/// Buffers of the face being read, reused for every face.
 #[derive(Default)]
 struct Row {
     corners: Vec<u32>,
@@ -101,12 +101,12 @@ struct Row {
     picture: Option<f64>,
 }
 
-/// The rows of an element of a text, which programs write a line each, although blanks of any kind part numbers.
+/// Line bookkeeping of a text element: programs write a row per line, although any white space separates numbers.
 #[derive(Default)]
 struct Rows {
-    /// Where the row begins that is read.
+    /// First line of the current row.
     start: u32,
-    /// Whether two rows have shared a line from the beginning on: then lines mean nothing.
+    /// Whether the first two rows shared a line: then lines mean nothing.
     is_free: bool,
 }
 
@@ -119,13 +119,13 @@ impl Reader<'_, '_> {
             ("tristrips", Some(list)) => self.faces(element, list, true),
             ("edge", _) if ends(element).is_some() => self.edges(element),
             _ => {
-                // Without properties there is nothing to pass over, however many there are.
+                // Rows without properties take no bytes, however many there are.
                 if element.properties.is_empty() { Ok(()) } else { self.pass(element) }
             }
         }
     }
 
-    /// Row `i` begins: tells when it begins in a line that belongs to the one before it, as all behind it will, then.
+    /// Starts row `i`. Records a warning if it begins on the last line of the row before, as all later rows will be shifted, too.
     fn row(&mut self, rows: &mut Rows, element: &Element, i: u64) {
         let Some([line, last]) = self.body.lines() else { return };
         let start = std::mem::replace(&mut rows.start, line);
@@ -163,7 +163,7 @@ impl Reader<'_, '_> {
             self.brighten(element, &slots);
             return Ok(());
         }
-        // The budget has room for so many, so memory has.
+        // The budget has room for that many vertices.
         self.bare.positions.reserve_exact(element.count as usize);
         let mut rows = Rows::default();
         for i in 0..element.count {
@@ -194,14 +194,14 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
-    /// Takes colours of sixteen bits for bytes where all are below 256: some programs write bytes into wider numbers, and no scan
+    /// Rescales 16-bit colours that are all below 256, as bytes: some programs write bytes into wider numbers, and no scan
     /// is as dark as that.
     fn brighten(&mut self, element: &Element, slots: &[Option<usize>]) {
-        /// What a byte is less than as it should be.
+        /// Ratio of the 16-bit code to the 8-bit code of a colour.
         const WIDER: f32 = 257.0;
-        /// Less may be noise in the dark.
+        /// Smallest brightest colour; below it the values may be noise in the dark.
         const LEAST: f32 = 8.0 / 255.0 / WIDER;
-        /// Above 255 of 65535 by half a step, for what rounding may do.
+        /// Half a step above 255 of 65535, to allow for rounding.
         const BYTE: f32 = 255.5 / 65535.0;
         let of_slot = |slot: usize| element.properties.iter().zip(slots).find(|(_, s)| **s == Some(slot));
         let is_wide = |slot: usize| of_slot(slot).is_some_and(|(property, _)| property.kind == Kind::U16);
@@ -217,8 +217,8 @@ impl Reader<'_, '_> {
         self.bare.told.push(Diagnostic::new("color-bytes", &self.source.path, "", text));
     }
 
-    /// Reads the vertices of a binary file side by side, where they are no lists and go with these numbers of them; whether
-    /// they could be.
+    /// Reads the vertices of a binary file in parallel, if they have no lists; `has` tells whether they have normals, texture
+    /// coordinates and colours. Returns whether they were read.
     fn packed_vertices(&mut self, element: &Element, slots: &[Option<usize>], has: [bool; 3]) -> bool {
         let Some(rows) = self.body.packed(element, None) else { return false };
         let mut said = [None; SLOTS.len()];
@@ -230,7 +230,7 @@ impl Reader<'_, '_> {
         let value = |row: Record, slot: usize| match said[slot] {
             Some((at, kind, _)) if slot < RED => row.value(at, kind),
             Some((at, kind, light)) => light.part(row.value(at, kind)),
-            // What says nothing of opacity is opaque.
+            // Vertices without opacity are opaque.
             None => f64::from(u8::from(slot == ALPHA)),
         };
         self.bare.positions = rows.each(|row| DVec3::from(PLACE.map(|slot| value(row, slot))));
@@ -249,7 +249,7 @@ impl Reader<'_, '_> {
         true
     }
 
-    /// Lines.
+    /// Reads edges as lines.
     fn edges(&mut self, element: &Element) -> Result<(), Diagnostic> {
         let Some(ends) = ends(element) else { return self.pass(element) };
         let (uses, mut rows) = (uses_in_edges(element, ends, self.wanted), Rows::default());
@@ -267,7 +267,7 @@ impl Reader<'_, '_> {
                     _ => self.pass_property(element, i, property)?,
                 }
             }
-            // An edge takes what a face of two corners would.
+            // An edge takes the memory of a face with two corners.
             PlainMesh::charge_faces(self.budget, 1, 2)
                 .map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
             self.bare.edge(edge, color);
@@ -275,7 +275,7 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
-    /// Polygons, or strips of triangles.
+    /// Reads polygons, or strips of triangles.
     fn faces(&mut self, element: &Element, list: usize, strips: bool) -> Result<(), Diagnostic> {
         let uses = uses_in_faces(element, list, strips, self.wanted);
         if !strips {
@@ -308,8 +308,8 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
-    /// Reads the faces of a binary file side by side, where all are triangles of vertices that are there and nothing is said of
-    /// them beside; whether they could be.
+    /// Reads the faces of a binary file in parallel, if all are triangles of existing vertices without other used properties.
+    /// Returns whether they were read.
     fn packed_triangles(&mut self, element: &Element, list: usize, uses: &[Use]) -> Result<bool, Diagnostic> {
         let lists = element.properties.iter().filter(|property| property.length.is_some()).count();
         let is_plain = lists == 1 && uses.iter().all(|used| matches!(used, Use::Corners | Use::Nothing));
@@ -336,7 +336,7 @@ impl Reader<'_, '_> {
         Ok(true)
     }
 
-    /// Adds a face that was read, with its colour and its place in a picture.
+    /// Adds a face that was read, with its colour, texture coordinates and picture.
     fn polygon(&mut self, i: u64, row: &Row) -> Result<(), Diagnostic> {
         let uvs = match row.uvs.as_chunks() {
             (uvs, []) if uvs.is_empty() || uvs.len() == row.corners.len() => uvs,
@@ -349,7 +349,7 @@ impl Reader<'_, '_> {
         self.face(&row.corners, &Said { uvs, color: row.color, picture })
     }
 
-    /// The picture of a number that face `i` says; none below 0.
+    /// Index of the picture that face `i` names; none for numbers below 0.
     fn picture(&mut self, i: u64, number: f64) -> u32 {
         let is_there = number >= 0.0 && number < self.bare.pictures.len() as f64 && number.fract() == 0.0;
         if !is_there {
@@ -363,7 +363,7 @@ impl Reader<'_, '_> {
         number
     }
 
-    /// Reads a part of a colour, of which the rest is white.
+    /// Reads a colour channel; channels not read are white.
     fn light(
         &mut self,
         element: &Element,
@@ -390,7 +390,7 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
-    /// Asks for the memory of the colours of so many faces or edges, if they have some.
+    /// Takes the memory of the colours of `count` faces or edges, if they have colours.
     fn take_colors(&mut self, count: u64, uses: &[Use]) -> Result<(), Diagnostic> {
         let is_colored = uses.iter().any(|used| matches!(used, Use::Light(_)));
         self.take(if is_colored { count } else { 0 }, PlainMesh::COLOR)
@@ -415,7 +415,7 @@ impl Reader<'_, '_> {
         corners.reserve_exact(usize::try_from(length).unwrap_or(usize::MAX));
         for k in 0..length {
             let value = self.value(element, i, property)?;
-            // Where numbers have no sign, −1 is the greatest of them, if no vertex is.
+            // In unsigned types, −1 is the largest value, unless a vertex has that index.
             let greatest = match property.kind {
                 Kind::U8 => f64::from(u8::MAX),
                 Kind::U16 => f64::from(u16::MAX),
@@ -432,7 +432,7 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
-    /// Asks for the memory of a list before it is read: that of a face, or, of strips, of what is forgotten with the next.
+    /// Takes the memory of a list before it is read: that of a face, or, for a strip, checks that of its temporary list.
     fn take_list(
         &mut self,
         length: u64,
@@ -441,7 +441,7 @@ impl Reader<'_, '_> {
         property: &Property,
         strips: bool,
     ) -> Result<(), Diagnostic> {
-        // Lengths fit into 32 bits.
+        // Lengths fit into 32 bits, so the product cannot overflow.
         if length * self.body.least(property.kind) > self.body.left() {
             return Err(self.missing(&Missing::End, element, i, property));
         }
@@ -454,9 +454,9 @@ impl Reader<'_, '_> {
         granted.map_err(|over| Diagnostic::over_budget(&self.source.path, over))
     }
 
-    /// The number of a vertex that is there.
+    /// Checks the index of a vertex.
     fn index(&self, value: f64, corner: u64, element: &Element, i: u64) -> Result<u32, Diagnostic> {
-        // Below the number of vertices, which fits.
+        // Less than the number of vertices, so it fits.
         let is_there = value >= 0.0 && value < self.vertices as f64 && value.fract() == 0.0;
         if !is_there {
             let (name, vertices) = (shorten(&element.name), self.vertices);
@@ -475,7 +475,7 @@ impl Reader<'_, '_> {
     fn strip(&mut self, strip: &[u32], color: Option<[f32; 4]>) -> Result<(), Diagnostic> {
         for (i, window) in strip.windows(3).enumerate() {
             let &[a, b, c] = window else { continue };
-            // Two equal corners only turn the strip.
+            // A window with two equal corners only flips the winding.
             if a != b && b != c && c != a {
                 let [a, b] = if i % 2 == 0 { [a, b] } else { [b, a] };
                 PlainMesh::charge_faces(self.budget, 1, 3)
@@ -489,7 +489,7 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
-    /// Adds a face whose memory was granted.
+    /// Adds a face whose memory was taken.
     fn face(&mut self, corners: &[u32], said: &Said) -> Result<(), Diagnostic> {
         let most = self.bare.corners.len().max(self.bare.arities.len()) as u64 + corners.len() as u64;
         if most > PlainMesh::LARGEST {
@@ -504,7 +504,7 @@ impl Reader<'_, '_> {
         self.body.value(property.kind).map_err(|why| self.missing(&why, element, i, property))
     }
 
-    /// How long a list is.
+    /// Reads the length of a list.
     fn length(&mut self, element: &Element, i: u64, property: &Property) -> Result<u64, Diagnostic> {
         let kind = property.length.unwrap_or(Kind::U8);
         let value = self.body.value(kind).map_err(|why| self.missing(&why, element, i, property))?;
@@ -520,7 +520,7 @@ impl Reader<'_, '_> {
         self.body.missing(why, &named(element, i, property))
     }
 
-    /// Passes over a whole element.
+    /// Skips a whole element.
     fn pass(&mut self, element: &Element) -> Result<(), Diagnostic> {
         for i in 0..element.count {
             for property in &element.properties {
@@ -536,7 +536,7 @@ impl Reader<'_, '_> {
     }
 }
 
-/// Stands between two strips; more than there can be vertices.
+/// Separates two strips; greater than any vertex index.
 const RESTART: u32 = u32::MAX;
 
 fn named(element: &Element, i: u64, property: &Property) -> String {

@@ -1,4 +1,4 @@
-//! The header of a PLY file: lines of words that end with `end_header`.
+//! The header of a PLY file: lines of words up to `end_header`.
 
 use crate::load::Diagnostic;
 use crate::load::diagnostic::CUT_OFF;
@@ -8,7 +8,7 @@ use crate::load::text::encoding::decode_name;
 use crate::load::text::without_mark;
 use std::path::Path;
 
-/// How values are written.
+/// Encoding of the values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Text,
@@ -16,7 +16,7 @@ pub(super) enum Encoding {
     BigEndian,
 }
 
-/// What kind of number a value is.
+/// Number type of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     I8,
@@ -30,12 +30,12 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Whether its values are whole numbers.
+    /// Whether the type is an integer.
     pub(super) fn is_whole(self) -> bool {
         !matches!(self, Self::F32 | Self::F64)
     }
 
-    /// Bytes in a binary file.
+    /// Size in a binary file, in bytes.
     pub(super) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -45,7 +45,7 @@ impl Kind {
         }
     }
 
-    /// The value at the beginning of these bytes of a binary file, if there are enough; exact.
+    /// Decodes the value at the beginning of `bytes`, exactly; `None` where there are too few.
     #[inline]
     pub(super) fn value(self, bytes: &[u8], big: bool) -> Option<f64> {
         #[inline]
@@ -68,7 +68,7 @@ impl Kind {
         })
     }
 
-    /// Both families of names are in use.
+    /// Type of a name; both families of names are in use.
     fn of(word: &str) -> Option<Self> {
         Some(match word {
             "char" | "int8" => Self::I8,
@@ -84,29 +84,29 @@ impl Kind {
     }
 }
 
-/// A named value of an element, or a list of them.
+/// A named value of an element, or a list of values.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Property {
     pub name: String,
     pub kind: Kind,
-    /// How the number of values in a list is written; `None`: one value.
+    /// Type of a list's length; `None`: a single value.
     pub length: Option<Kind>,
 }
 
-/// Things of one kind.
+/// A declared element: rows of properties.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Element {
     pub name: String,
-    /// As claimed; nothing has been looked at.
+    /// Number of rows as claimed, not verified.
     pub count: u64,
     pub properties: Vec<Property>,
 }
 
 impl Element {
-    /// Bytes that one of it takes in the file at least.
+    /// Smallest size of a row in the file, in bytes.
     pub(super) fn least(&self, encoding: Encoding) -> u64 {
         let size = |property: &Property| match encoding {
-            // A digit; what follows it may be the end of the file.
+            // A digit; the end of the file may follow it.
             Encoding::Text => 1,
             _ => property.length.unwrap_or(property.kind).size() as u64,
         };
@@ -114,26 +114,26 @@ impl Element {
     }
 }
 
-/// What the header says.
+/// The parsed header.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Header {
     pub encoding: Encoding,
     pub elements: Vec<Element>,
-    /// Comments and object information, without those words.
+    /// Comments and object information, without their keywords.
     pub comments: Vec<String>,
-    /// Pictures that comments name, as MeshLab writes them (`comment TextureFile`), with their lines.
+    /// Pictures named by comments in MeshLab's style (`comment TextureFile`), with their lines.
     pub pictures: Vec<(u32, String)>,
-    /// Bytes before the first value.
+    /// Length of the header, in bytes.
     pub length: usize,
-    /// Lines before the first value.
+    /// Number of lines of the header.
     pub lines: u32,
 }
 
 impl Header {
-    /// Reads the header.
+    /// Parses the header.
     ///
     /// # Errors
-    /// At the first line that is not understood.
+    /// At the first line that is not valid.
     pub(super) fn read(bytes: &[u8], file: &Path) -> Result<Self, Diagnostic> {
         let mut lines = Lines::new(bytes);
         let mut parts = Parts {
@@ -161,14 +161,14 @@ impl Header {
         Err(parts.fault("the file ends inside the header, before `end_header`", CUT_OFF))
     }
 
-    /// The element of a name.
+    /// First element of that name.
     pub(super) fn element(&self, name: &str) -> Option<&Element> {
         self.elements.iter().find(|element| element.name == name)
     }
 }
 
-/// Lines that end with LF, before which CR may stand, or all with CR where the first one does: in a binary file, what follows
-/// the last may look like half a line end.
+/// Splits lines at LF, optionally preceded by CR, or at CR where the first line ends so: in a binary file, the bytes behind
+/// the last line may look like half a line end.
 struct Lines<'a> {
     bytes: &'a [u8],
     end: u8,
@@ -198,25 +198,25 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// A header in the making.
+/// Header under construction.
 struct Parts<'a> {
     file: &'a Path,
     line: u32,
     encoding: Option<Encoding>,
     elements: Vec<Element>,
-    /// Elements and properties so far.
+    /// Number of elements, properties and pictures so far.
     parts: usize,
     comments: Vec<String>,
     pictures: Vec<(u32, String)>,
 }
 
-/// Elements, properties and pictures of a header at most, far more than programs write.
+/// Largest number of elements, properties and pictures of a header, far more than programs write.
 const MOST: usize = 4096;
 
-/// Bytes of the name of a picture at most: no system has longer ones.
+/// Longest name of a picture, in bytes: no system has longer ones.
 const LONGEST_NAME: usize = 4096;
 
-/// Comments that are kept: programs write theirs first.
+/// Number of comments that are kept: programs write theirs first.
 const COMMENTS: usize = 64;
 
 impl Parts<'_> {
@@ -224,7 +224,7 @@ impl Parts<'_> {
         Diagnostic::new("ply-header", self.file, self.line.to_string(), text).remedy(remedy)
     }
 
-    /// Takes one line; whether it was the last.
+    /// Parses one line; returns whether it was the last.
     fn take(&mut self, line: &str) -> Result<bool, Diagnostic> {
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
         match words[..] {
@@ -293,7 +293,7 @@ impl Parts<'_> {
         Kind::of(word).ok_or_else(|| self.fault(format!("`{}` is no type of PLY", shorten(word)), known))
     }
 
-    /// Counts an element, a property or a picture, of which there are not too many.
+    /// Counts an element, a property or a picture, and refuses too many.
     fn count(&mut self) -> Result<(), Diagnostic> {
         self.parts += 1;
         if self.parts > MOST {

@@ -1,8 +1,8 @@
-//! What properties of elements mean, by the names that programs give them.
+//! Meanings of properties, by the names that programs give them.
 
 use super::header::{Element, Header, Kind, Property};
 
-/// Numbers of a vertex that have a meaning here.
+/// Names of the vertex properties that are read, by slot.
 pub(super) const SLOTS: [&[&str]; 12] = [
     &["x"],
     &["y"],
@@ -18,7 +18,7 @@ pub(super) const SLOTS: [&[&str]; 12] = [
     &["alpha", "a", "opacity", "diffuse_alpha"],
 ];
 
-/// Where what belongs together stands in [`SLOTS`].
+/// Slots of properties that belong together, as indices into [`SLOTS`].
 pub(super) const PLACE: [usize; 3] = [0, 1, 2];
 pub(super) const NORMAL: [usize; 3] = [3, 4, 5];
 pub(super) const UV: [usize; 2] = [6, 7];
@@ -30,16 +30,16 @@ pub(super) const ALPHA: usize = 11;
 /// Real-Time Radiance Field Rendering", 2023).
 const SPLAT: [&str; 3] = ["f_dc_0", "f_dc_1", "f_dc_2"];
 
-/// Whether vertices are Gaussian splats. Their normals are 0, and their opacities are of a haze.
+/// Whether vertices are Gaussian splats. Their normals are 0, and their opacities those of a haze: both are ignored.
 pub(super) fn are_splats(vertex: &Element) -> bool {
     SPLAT.iter().all(|name| vertex.properties.iter().any(|property| property.name == *name))
 }
 
-/// What properties of a vertex mean.
+/// Meanings of the properties of a vertex.
 pub(super) struct Meanings<'a> {
-    /// Of each property the place in [`SLOTS`]; of several with one meaning the first has it.
+    /// Index into [`SLOTS`] of each property; of several with one meaning the first has it.
     pub slots: Vec<Option<usize>>,
-    /// For each meaning that several have, the names of the first two.
+    /// Names of the first two properties of each meaning that several have.
     pub twice: Vec<[&'a str; 2]>,
 }
 
@@ -62,12 +62,12 @@ impl<'a> Meanings<'a> {
     }
 }
 
-/// How a property says a part of a colour.
+/// Encoding of a colour channel.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Light {
-    /// As part of this, which stands for full light.
+    /// A number relative to this value of full light.
     Of(f64),
-    /// As that of a splat.
+    /// Spherical harmonic of a splat.
     OfSplat,
 }
 
@@ -76,10 +76,10 @@ impl Light {
         if SPLAT.contains(&property.name.as_str()) { Self::OfSplat } else { Self::Of(unit(property.kind)) }
     }
 
-    /// What is written so, 0…1.
+    /// Decodes a value to 0…1.
     #[inline]
     pub(super) fn part(self, value: f64) -> f64 {
-        /// 1 / (2 √π), the spherical harmonic that is the same all around.
+        /// 1 / (2 √π), the constant spherical harmonic.
         const EVEN: f64 = 0.282_094_791_773_878_14;
         match self {
             Self::Of(full) => value / full,
@@ -88,7 +88,7 @@ impl Light {
     }
 }
 
-/// Which property lists the corners of faces.
+/// Index of the property that lists the corners of faces.
 pub(super) fn list_of(element: &Element) -> Option<usize> {
     let lists = |property: &Property| {
         property.length.is_some()
@@ -97,14 +97,14 @@ pub(super) fn list_of(element: &Element) -> Option<usize> {
     element.properties.iter().position(lists)
 }
 
-/// Which properties of an edge are its ends.
+/// Indices of the properties that hold the ends of an edge.
 pub(super) fn ends(element: &Element) -> Option<[usize; 2]> {
     let number = |property: &Property, name: &str| property.length.is_none() && property.name == name;
     let slot = |name| element.properties.iter().position(|property| number(property, name));
     Some([slot("vertex1")?, slot("vertex2")?])
 }
 
-/// What stands for full light.
+/// Value of full light in colours of a number type.
 fn unit(kind: Kind) -> f64 {
     match kind {
         Kind::F32 | Kind::F64 => 1.0,
@@ -113,12 +113,12 @@ fn unit(kind: Kind) -> f64 {
     }
 }
 
-/// What is worth reading of faces and edges.
+/// Which properties of faces and edges are read.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wanted {
-    /// Their colours: those of vertices are finer, where these have some.
+    /// Whether their colours are read: not where vertices have colours, which are finer.
     pub colors: bool,
-    /// Which part of which picture their corners show: whether there are pictures.
+    /// Whether the texture coordinates and pictures of corners are read: only where the file names pictures.
     pub pictures: bool,
 }
 
@@ -131,24 +131,24 @@ impl Wanted {
     }
 }
 
-/// What a property of a face or an edge is read for.
+/// Use of a property of a face or an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Use {
-    /// The list of its corners.
+    /// List of the corners.
     Corners,
-    /// Which end of an edge it is.
+    /// Vertex at this end of an edge.
     End(usize),
-    /// The texture coordinates of its corners, u and v of one after another.
+    /// Texture coordinates of the corners, u and v interleaved.
     Uvs,
-    /// The number of its picture; below 0: none.
+    /// Index of the picture; negative: none.
     Picture,
-    /// Part of its colour: red, green, blue or opacity.
+    /// Channel of the colour: red, green, blue or opacity.
     Light(usize),
     Nothing,
 }
 
-/// What each property of faces whose corners are in `list` is read for; of strips, whose triangles share corners, only these
-/// and colours are.
+/// Use of each property of faces whose corners are in `list`; for strips, whose triangles share corners, only corners and
+/// colours are used.
 pub(super) fn uses_in_faces(face: &Element, list: usize, strips: bool, wanted: Wanted) -> Vec<Use> {
     let of = |(k, property): (usize, &Property)| match (property.name.as_str(), property.length) {
         _ if k == list => Use::Corners,
@@ -159,7 +159,7 @@ pub(super) fn uses_in_faces(face: &Element, list: usize, strips: bool, wanted: W
     face.properties.iter().enumerate().map(of).collect()
 }
 
-/// What each property of edges with these ends is read for.
+/// Use of each property of edges with these ends.
 pub(super) fn uses_in_edges(edge: &Element, ends: [usize; 2], wanted: Wanted) -> Vec<Use> {
     let of = |k| match ends.iter().position(|&end| end == k) {
         Some(end) => Use::End(end),
@@ -174,7 +174,7 @@ pub(super) fn are_colored(element: &Element) -> bool {
     COLOR.iter().all(has)
 }
 
-/// The part of a colour that the `k`th property is, if it is the first that says it.
+/// Colour channel of the `k`th property, if it is the first for that channel.
 fn light_in(element: &Element, k: usize, wanted: Wanted) -> Use {
     let (before, rest) = element.properties.split_at(k);
     let part = (RED..=ALPHA).find(|&slot| rest.first().is_some_and(|property| is_in(property, slot)));

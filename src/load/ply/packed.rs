@@ -1,22 +1,22 @@
-//! Rows of a binary file that all take the same bytes, which threads read side by side.
+//! Rows of fixed size in a binary file, which threads read in parallel.
 
 use super::header::{Element, Encoding, Kind};
 use rayon::prelude::*;
 
-/// Rows that one thread reads at a time.
+/// Number of rows per parallel task.
 const ROWS: usize = 1 << 12;
 
 /// The rows of an element.
 pub(super) struct Packed<'a> {
     bytes: &'a [u8],
     big: bool,
-    /// Where each property begins in a row; behind them its length.
+    /// Offset of each property in a row; the last entry is the length of a row.
     starts: Vec<usize>,
 }
 
 impl<'a> Packed<'a> {
-    /// Those at the beginning of `bytes`, if every list had `in_lists` values (`None`: no lists). `None` of a text, and where
-    /// there are not so many bytes.
+    /// Rows at the beginning of `bytes`, given that every list has `in_lists` values (`None`: no lists). `None` for text files,
+    /// and where `bytes` is too short.
     pub(super) fn of(element: &Element, encoding: Encoding, bytes: &'a [u8], in_lists: Option<usize>) -> Option<Self> {
         if encoding == Encoding::Text || element.properties.is_empty() {
             return None;
@@ -32,22 +32,22 @@ impl<'a> Packed<'a> {
         Some(Self { bytes: bytes.get(..length)?, big: encoding == Encoding::BigEndian, starts })
     }
 
-    /// Bytes of all of them.
+    /// Length of all rows, in bytes.
     pub(super) fn length(&self) -> usize {
         self.bytes.len()
     }
 
-    /// Where in each row this property begins.
+    /// Offset of a property in each row.
     pub(super) fn start(&self, property: usize) -> usize {
         self.starts[property]
     }
 
-    /// What is made of each row.
+    /// Maps every row.
     pub(super) fn each<T: Send>(&self, make: impl Fn(Record) -> T + Sync + Send) -> Vec<T> {
         self.rows().map(make).collect()
     }
 
-    /// Whether all rows are so.
+    /// Whether all rows satisfy a predicate.
     pub(super) fn all(&self, are: impl Fn(Record) -> bool + Sync + Send) -> bool {
         self.rows().all(are)
     }
@@ -58,7 +58,7 @@ impl<'a> Packed<'a> {
     }
 }
 
-/// The bytes of one row.
+/// Bytes of one row.
 #[derive(Clone, Copy)]
 pub(super) struct Record<'a> {
     bytes: &'a [u8],
@@ -66,7 +66,7 @@ pub(super) struct Record<'a> {
 }
 
 impl Record<'_> {
-    /// The number that begins there; it lies in the row.
+    /// Number at offset `at`, which lies in the row.
     #[inline]
     pub(super) fn value(self, at: usize, kind: Kind) -> f64 {
         self.bytes.get(at..).and_then(|bytes| kind.value(bytes, self.big)).unwrap_or(f64::NAN)

@@ -1,4 +1,4 @@
-//! What a PLY file says beyond what is drawn, for warnings.
+//! Warnings about contents of a PLY file that are not drawn.
 
 use super::header::{Element, Header};
 use super::meaning::{Meanings, Wanted, are_colored, are_splats, list_of};
@@ -6,7 +6,7 @@ use crate::load::Diagnostic;
 use crate::load::paths::shorten;
 use std::path::Path;
 
-/// Warnings of what would change the look, and is not read.
+/// Warnings about contents that would change the look and are not read.
 pub(super) fn passed_over(header: &Header, file: &Path) -> Vec<Diagnostic> {
     let warning = |code, text: String, remedy: &str| Diagnostic::new(code, file, "", text).remedy(remedy);
     let mut told = Vec::new();
@@ -33,7 +33,7 @@ pub(super) fn passed_over(header: &Header, file: &Path) -> Vec<Diagnostic> {
         name => name == "vertex",
     };
     for element in header.elements.iter().filter(|element| element.count > 0 && !is_read(element)) {
-        // Numbers of vertices, under other names.
+        // Lists of vertex indices under other names.
         let mut lists = element.properties.iter().filter(|property| property.length.is_some());
         let Some(list) = lists.find(|list| list.kind.is_whole()) else { continue };
         let (name, list) = (shorten(&element.name), shorten(&list.name));

@@ -1,4 +1,4 @@
-//! Binary STL: 80 bytes of anything, the number of triangles, and 50 bytes for each.
+//! Binary STL: 80 arbitrary bytes, the number of triangles, and 50 bytes for each.
 
 use super::Making;
 use crate::load::diagnostic::CUT_OFF;
@@ -9,28 +9,28 @@ use crate::scene::Material;
 use crate::scene::color::to_srgb;
 use rayon::prelude::*;
 
-/// Bytes before the first triangle.
+/// Offset of the first triangle, in bytes.
 const HEADER: usize = 84;
 
-/// Bytes of a triangle: a normal, three places, and two bytes of attributes.
+/// Size of a triangle, in bytes: a normal, three positions, and two bytes of attributes.
 const TRIANGLE: usize = 50;
 
-/// How many triangles the header claims.
+/// Number of triangles that the header claims.
 fn claimed(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(80..HEADER)?.first_chunk::<4>()?;
     Some(u64::from(u32::from_le_bytes(*count)))
 }
 
-/// Whether the file is as long as a binary STL of so many triangles: hardly anything else is.
+/// Whether the length of the file matches its count of triangles: other files hardly ever do.
 pub(in crate::load) fn is_exact(bytes: &[u8]) -> bool {
     claimed(bytes).is_some_and(|count| HEADER as u64 + count * TRIANGLE as u64 == bytes.len() as u64)
 }
 
-/// Reads every triangle. A header that claims none, or as many as can be, is not believed where whole ones follow: programs
-/// write it first, and some never come back to it.
+/// Reads every triangle. A count of 0, or the largest possible one, is ignored where whole triangles follow: programs
+/// write the header first, and some never update it.
 ///
 /// # Errors
-/// When there are fewer than the header claims. What follows them is not looked at; a warning counts it.
+/// When there are fewer triangles than the header claims. Bytes behind them are ignored; a warning counts them.
 pub(super) fn read(source: &Source, mut making: Making) -> Result<PlainMesh, Diagnostic> {
     let bytes = source.bytes.as_slice();
     let fault = |at: usize, text: String| {
@@ -46,7 +46,7 @@ pub(super) fn read(source: &Source, mut making: Making) -> Result<PlainMesh, Dia
         let text = format!("the header claims {claimed} triangles, but only {} are there", records.len());
         return Err(fault(HEADER + records.len() * TRIANGLE, text));
     }
-    // As many as there are in memory.
+    // No more than the records in memory.
     let records = if uncounted { records } else { &records[..claimed as usize] };
     let paint = Paint::of(&bytes[..80], records);
     making.take(records.len())?;
@@ -55,7 +55,7 @@ pub(super) fn read(source: &Source, mut making: Making) -> Result<PlainMesh, Dia
         making.take_colors(records.len())?;
         records.par_iter().map(|record| paint.color(attributes(record))).collect_into_vec(&mut colors);
     }
-    // What was single precision is told apart as such.
+    // Positions were single precision, so that compares them exactly.
     let bits = |place: DVec3| place.as_vec3().to_array().map(f32::to_bits);
     let mut bare = making.triangles(3 * records.len(), |corner| place(records, corner), bits, colors)?;
     if uncounted {
@@ -69,7 +69,7 @@ pub(super) fn read(source: &Source, mut making: Making) -> Result<PlainMesh, Dia
     Ok(bare)
 }
 
-/// Where a corner is; each triangle has three, behind its normal.
+/// Position of a corner; each triangle has three, behind its normal.
 fn place(records: &[[u8; TRIANGLE]], corner: usize) -> DVec3 {
     let record = &records[corner / 3];
     let number = |k: usize| f64::from(f32::from_le_bytes([record[k], record[k + 1], record[k + 2], record[k + 3]]));
@@ -77,7 +77,7 @@ fn place(records: &[[u8; TRIANGLE]], corner: usize) -> DVec3 {
     DVec3::new(number(at), number(at + 4), number(at + 8))
 }
 
-/// A warning when bytes follow the triangles that are read.
+/// Warning when bytes follow the triangles that are read.
 fn behind(source: &Source, triangles: usize) -> Option<Diagnostic> {
     let end = HEADER + triangles * TRIANGLE;
     let bytes = source.bytes.len().checked_sub(end).filter(|bytes| *bytes > 0)?;
@@ -86,34 +86,34 @@ fn behind(source: &Source, triangles: usize) -> Option<Diagnostic> {
     Some(warning.remedy("they are not read"))
 }
 
-/// The two bytes behind the corners.
+/// Attributes of a triangle: the two bytes behind its corners.
 fn attributes(record: &[u8; TRIANGLE]) -> u16 {
     u16::from_le_bytes([record[TRIANGLE - 2], record[TRIANGLE - 1]])
 }
 
-/// What attributes mean where they are colours, five bits to a part.
+/// Interpretation of attributes as colours, five bits per channel.
 struct Paint {
-    /// Where red, green and blue begin.
+    /// Shifts of red, green and blue.
     parts: [u32; 3],
-    /// The highest bit of triangles that have a colour of their own.
+    /// Highest bit of the attributes of triangles with a colour of their own.
     own: u16,
-    /// The colour of the others; none of them has one where this is everything that the file says.
+    /// Colour of the other triangles; of all triangles where `is_all`, as the file gives no other.
     whole: [f32; 4],
     is_all: bool,
 }
 
 impl Paint {
-    /// In either of the two ways in use: Materialise Magics writes `COLOR=` and four bytes into the header, the colour of the
-    /// whole, and a triangle has its own where the highest bit is clear; VisCAM and SolidView write no more than triangles with
-    /// the highest bit set, and the other order of parts. `None` where there is no sign of either. MeshLab writes Magics' sign
-    /// and sets the bit of all triangles, which have colours of their own all the same.
+    /// Detects either of the two conventions: Materialise Magics writes `COLOR=` and four bytes into the header, the colour
+    /// of the whole, and clears the highest bit of triangles with their own colour; VisCAM and SolidView only set the highest bit
+    /// of coloured triangles, and order the channels the other way. `None` where there is no sign of either. MeshLab writes
+    /// Magics' sign and sets the bit of all triangles, which have colours of their own nevertheless.
     fn of(header: &[u8], records: &[[u8; TRIANGLE]]) -> Option<Self> {
         const SIGN: &[u8] = b"COLOR=";
         const OWN: u16 = 1 << 15;
         let sign = header.windows(SIGN.len()).position(|word| word == SIGN);
         if let Some(&[red, green, blue]) = sign.and_then(|at| header[at + SIGN.len()..].first_chunk()) {
             let [r, g, b] = [red, green, blue].map(|c| f32::from(c) / 255.0);
-            // Programs that know the colour of the whole alone leave the attributes 0, which would be black.
+            // Programs that know only the colour of the whole leave the attributes 0, which would be black.
             let is_all = records.iter().all(|record| attributes(record) == 0);
             let all_set = records.iter().all(|record| attributes(record) & OWN != 0);
             let differ = records.windows(2).any(|pair| attributes(&pair[0]) != attributes(&pair[1]));
@@ -125,7 +125,7 @@ impl Paint {
         is_painted.then_some(Self { parts: [10, 5, 0], own: OWN, whole: [r, g, b, 1.0], is_all: false })
     }
 
-    /// sRGB-coded, and opaque.
+    /// Colour of a triangle, sRGB-coded and opaque.
     fn color(&self, attributes: u16) -> [f32; 4] {
         if self.is_all || attributes & (1 << 15) != self.own {
             return self.whole;

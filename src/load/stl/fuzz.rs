@@ -1,4 +1,4 @@
-//! Files that nobody wrote: whatever comes in, the loader ends with a scene that holds together or with an error.
+//! Arbitrary files: the loader returns a sound scene or an error, whatever the input.
 
 use super::tests::{binary, of, text};
 use crate::load::LoadOptions;

@@ -1,11 +1,11 @@
 //! STL, the format of stereolithography (3D Systems, 1988) -> scene: triangles as text or in binary.
 //!
-//! Every triangle brings places of its own; those that are equal bit for bit become one vertex, so that faces are
-//! connected. Surfaces are flat: the normal that the file gives for a facet says nothing that its corners do not, and is
-//! often wrong, so that it is not read. Its two bytes of attributes are a colour where something says so.
+//! Every triangle brings positions of its own; bitwise equal ones become one vertex, so that faces are
+//! connected. Surfaces are flat: the normal that the file gives for a facet follows from its corners, and is
+//! often wrong, so that it is not read. Its two bytes of attributes are a colour where the file marks them as such.
 //!
-//! The reader is our own: crates for STL take a binary file that begins with `solid` for text, and do not say where in the
-//! file a fault is.
+//! The reader is our own: crates for STL take a binary file that begins with `solid` for text, and do not report where in
+//! the file a fault is.
 
 mod binary;
 mod text;
@@ -23,19 +23,19 @@ use weld::{Welded, weld};
 
 pub(super) use binary::is_exact;
 
-/// How triangles are written.
+/// Encoding of the triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// As words.
+    /// Words.
     Text,
-    /// As records of 50 bytes.
+    /// Records of 50 bytes.
     Binary,
 }
 
-/// Loads an STL file; whatever that takes comes out of `budget`.
+/// Loads an STL file; its memory is taken from `budget`.
 ///
 /// # Errors
-/// When the text is not understood, or a binary file holds fewer triangles than it says: with the line or byte. A file
+/// When the text is invalid, or a binary file holds fewer triangles than it claims: with the line or byte. A file
 /// without triangles is an empty scene.
 pub fn load(
     source: &Source,
@@ -53,39 +53,39 @@ pub fn load(
     plain_mesh::load(bare, format, otherwise, source, options, budget)
 }
 
-/// What the memory comes out of that triangles are made with.
+/// Memory accounting while triangles are made.
 struct Making<'a> {
     file: &'a Path,
     budget: &'a mut Budget,
-    /// Bytes of what is forgotten when vertices are known.
+    /// Bytes that are freed once vertices are known.
     held: u64,
 }
 
 impl Making<'_> {
-    /// Takes the memory of so many triangles, before they are made.
+    /// Takes the memory of `triangles` triangles, before they are made.
     fn take(&mut self, triangles: usize) -> Result<(), Diagnostic> {
         let taken = PlainMesh::charge_faces(self.budget, triangles as u64, 3);
         taken.map_err(|over| Diagnostic::over_budget(self.file, over))
     }
 
-    /// Takes the memory of so many triangles' colours, before they are made.
+    /// Takes the memory of the colours of `triangles` triangles, before they are made.
     fn take_colors(&mut self, triangles: usize) -> Result<(), Diagnostic> {
         let taken = self.budget.take(triangles as u64, PlainMesh::COLOR);
         taken.map_err(|over| Diagnostic::over_budget(self.file, over))
     }
 
-    /// Makes sure of room for what is held until vertices are known, so many times so many bytes more than before.
+    /// Checks that the budget has room for a further `count` items of `bytes` bytes, held until vertices are known.
     fn hold(&mut self, count: usize, bytes: u64) -> Result<(), Diagnostic> {
         self.held = self.held.saturating_add((count as u64).saturating_mul(bytes));
         let mut for_now = *self.budget;
         for_now.take(self.held, 1).map_err(|over| Diagnostic::over_budget(self.file, over))
     }
 
-    /// Triangles whose memory was taken: corner `c` is at `place(c)`, and equal places, which are told by their `bits`, become
+    /// Makes triangles whose memory was taken: corner `c` lies at `place(c)`, and positions with equal `bits` become
     /// one vertex. There are as many colours as triangles, or none.
     ///
     /// # Errors
-    /// When there are too many, or memory for what joins them is not left.
+    /// When there are too many corners, or too little memory is left for welding.
     fn triangles<P: Pod + Eq + Send + Sync>(
         mut self,
         corners: usize,
@@ -98,7 +98,7 @@ impl Making<'_> {
             let text = format!("more than {} corners", weld::LARGEST);
             return Err(Diagnostic::new("stl-too-large", self.file, "", text).remedy("split the file"));
         }
-        // Adding 0 makes one zero of two.
+        // Adding 0 maps −0 to +0.
         let Welded { firsts, vertices } = weld(corners, |corner| bits(place(corner) + DVec3::ZERO));
         PlainMesh::charge_vertices(self.budget, firsts.len() as u64)
             .map_err(|over| Diagnostic::over_budget(self.file, over))?;

@@ -1,4 +1,4 @@
-//! Whole files, made in memory.
+//! Whole files, built in memory.
 
 use super::*;
 use crate::load::{Limits, load_bytes};
@@ -6,7 +6,7 @@ use crate::math::Vec3;
 use crate::scene::UpAxis;
 use crate::scene::color::to_srgb;
 
-/// A tetrahedron above the xy plane: four triangles on four places.
+/// A tetrahedron above the xy plane: four triangles on four positions.
 const CORNERS: [[[f32; 3]; 3]; 4] = {
     let [a, b, c, d] = [[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.5]];
     [[a, c, b], [a, b, d], [b, c, d], [c, a, d]]
@@ -17,7 +17,7 @@ pub(super) fn binary(header: &str) -> Vec<u8> {
     out.resize(80, 0);
     out.extend(4u32.to_le_bytes());
     for corners in CORNERS {
-        // A normal that is wrong, as many are, and attributes.
+        // A wrong normal, as is common, and attributes.
         out.extend([9f32, f32::NAN, 0.0].iter().flat_map(|x| x.to_le_bytes()));
         out.extend(corners.iter().flatten().flat_map(|x| x.to_le_bytes()));
         out.extend([0x12, 0x34]);
@@ -208,7 +208,7 @@ fn coordinates_that_are_not_finite_drop_their_faces() {
 
 #[test]
 fn attributes_are_colours_in_either_order_where_something_says_so() {
-    /// The tetrahedron with these attributes, and the sRGB codes of each triangle, 0…31.
+    /// The tetrahedron with these attributes; returns the sRGB codes of each triangle, 0…31.
     fn painted(header: &str, attributes: [u16; 4]) -> Vec<[f32; 3]> {
         let mut bytes = binary(header);
         for (record, attributes) in bytes[84..].as_chunks_mut::<50>().0.iter_mut().zip(attributes) {
@@ -231,7 +231,7 @@ fn attributes_are_colours_in_either_order_where_something_says_so() {
     let parts = 31 | 15 << 5;
     let grey = (to_srgb(0.6) * 31.0 * 1e3).round() / 1e3;
     assert_eq!(painted("VisCAM", [own | parts, parts, own, own | parts]), [high, [grey; 3], [0.0; 3], high]);
-    // The header is text here: bytes of codes below 128.
+    // The header is a string here: bytes of codes below 128.
     let header = "COLOR=\x33\x66\x00\x7f,MATERIAL=";
     let whole = [31.0 * 0.2, 31.0 * 0.4, 0.0].map(|c: f32| (c * 1e3).round() / 1e3);
     assert_eq!(painted(header, [parts, own | parts, 0, parts]), [low, whole, [0.0; 3], low]);
@@ -253,7 +253,7 @@ fn triangles_behind_a_header_that_counts_none_are_drawn_and_told() {
     bytes[80..84].fill(0xff);
     assert_eq!(plain(&bytes).warnings[0].to_string(), text.replace("claims 0", "claims 4294967295"));
     bytes[80..84].fill(0);
-    // What is no whole triangle is none.
+    // An incomplete triangle does not count.
     bytes.pop();
     let loaded = plain(&bytes);
     assert_eq!((loaded.facts.faces, loaded.warnings[0].code), (0, "stl-bytes-behind"));

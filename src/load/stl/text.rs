@@ -1,8 +1,8 @@
 //! STL as text: `solid`, then for each triangle `facet normal x y z`, `outer loop`, three times `vertex x y z`, `endloop`,
 //! `endfacet`; at the end `endsolid`. There may be several solids.
 //!
-//! Words may stand on any lines and in any case, as programs write them. Some part `endloop` and the like in two, leave out
-//! `endfacet`, or write colours, which no two programs write alike and which are not read.
+//! Words may stand on any lines and in any case, as programs write them. Some split `endloop` and the like in two, omit
+//! `endfacet`, or write colours, in formats of their own that are not read.
 
 use super::Making;
 use crate::load::diagnostic::{CUT_OFF, DAMAGED};
@@ -13,16 +13,16 @@ use crate::load::{Diagnostic, Source};
 use crate::math::DVec3;
 use std::path::Path;
 
-/// Bytes of the places of a facet, in a list that grows by being copied to twice its room.
+/// Bytes of the positions of a facet, in a list that grows by being copied to twice its capacity.
 const FACET: u64 = 3 * 3 * size_of::<DVec3>() as u64;
 
 /// Reads every triangle.
 ///
 /// # Errors
-/// At the first word that is out of place, with its line; colours never are. A solid without its end may be whole all the
-/// same; a warning says so.
+/// At the first word that is out of place, with its line; colours never are. A solid without its end may be complete
+/// nevertheless, and costs a warning.
 pub(super) fn read(source: &Source, mut making: Making) -> Result<PlainMesh, Diagnostic> {
-    // Zeros fill the last block of what was copied in blocks.
+    // Files copied in blocks are padded with zeros.
     let length = source.bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
     let bytes = without_mark(&source.bytes[..length]);
     let mut words = Words { file: &source.path, words: words::Words::new(bytes, 0, 1) };
@@ -64,7 +64,7 @@ pub(super) fn read(source: &Source, mut making: Making) -> Result<PlainMesh, Dia
     Ok(bare)
 }
 
-/// The three places of a facet; its normal may be anything.
+/// Reads the three positions of a facet; its normal may be anything.
 fn facet(words: &mut Words) -> Result<[DVec3; 3], Diagnostic> {
     words.expect("normal")?;
     for _ in 0..3 {
@@ -82,7 +82,7 @@ fn facet(words: &mut Words) -> Result<[DVec3; 3], Diagnostic> {
     Ok(corners)
 }
 
-/// Whether a word is `endsolid`, which some programs write in one with the name.
+/// Whether a word is `endsolid`; some programs join it with the name.
 fn ends_solid(word: &[u8]) -> bool {
     const END: &str = "endsolid";
     word.get(..END.len()).is_some_and(|start| is(start, END))
@@ -107,7 +107,7 @@ impl<'a> Words<'a> {
         self.words.next()
     }
 
-    /// The name of a solid, which may be of any words: up to the end of the line, or the first facet on it.
+    /// Reads the name of a solid, of any words: up to the end of the line, or to the first facet on it.
     fn name(&mut self) -> String {
         let (start, mut end) = (self.words.at, self.words.at);
         while let Some(word) = self.words.next_in_line() {
@@ -122,7 +122,7 @@ impl<'a> Words<'a> {
         name.split_ascii_whitespace().collect::<Vec<_>>().join(" ")
     }
 
-    /// Passes over the name behind `endsolid`: up to the end of the line, or the solid that has a facet on it.
+    /// Skips the name behind `endsolid`: up to the end of the line, or to a solid that has a facet on it.
     fn pass_name(&mut self) {
         let mut solid = None;
         loop {
@@ -152,7 +152,7 @@ impl<'a> Words<'a> {
         if is(word, keyword) { Ok(()) } else { Err(self.fault(word, &format!("`{keyword}`"))) }
     }
 
-    /// What stands next stays there.
+    /// Returns the next word without consuming it.
     fn peek(&mut self) -> &'a [u8] {
         let (at, line) = (self.words.at, self.words.line);
         let word = self.next().unwrap_or_default();
@@ -160,7 +160,7 @@ impl<'a> Words<'a> {
         word
     }
 
-    /// Passes over the parts of a colour.
+    /// Skips the numbers of a colour.
     fn pass_numbers(&mut self) {
         let is_number = |word: &[u8]| word.first().is_some_and(|b| b.is_ascii_digit() || b"+-.".contains(b));
         for _ in 0..4 {
@@ -170,7 +170,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// Passes over a colour, if one stands next.
+    /// Skips a colour, if one comes next.
     fn pass_color(&mut self) {
         if is_color(self.peek()) {
             self.next();
@@ -178,7 +178,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// A keyword that begins with `end`, in one word or two.
+    /// Expects a keyword that begins with `end`, as one word or two.
     fn end(&mut self, keyword: &str) -> Result<(), Diagnostic> {
         self.pass_color();
         match keyword.strip_prefix("end").filter(|_| is(self.peek(), "end")) {
@@ -190,7 +190,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// `endfacet`, and what some programs write behind it, the parts of a colour; others write nothing at all.
+    /// Expects `endfacet`, which some programs omit, and skips the numbers of a colour that others write behind it.
     fn end_of_facet(&mut self) -> Result<(), Diagnostic> {
         self.pass_color();
         let next = self.peek();

@@ -1,8 +1,8 @@
-//! Equal places -> one vertex each, numbered in the order in which they are first met.
+//! Welds corners at equal positions into one vertex each, numbered in the order of first occurrence.
 //!
-//! Corners are dealt by a hash of their place to tables that fit a processor's own cache, and threads fill these side by
-//! side: a table for all would miss the cache at nearly every corner. The hash has a seed of its own in each run, so that no
-//! file can be made whose places meet in one slot; numbers do not depend on it.
+//! Corners are partitioned by a hash of their position into tables that fit a processor's own cache, and threads fill the
+//! tables in parallel: a single table would miss the cache at nearly every corner. The hash has a random seed in each run, so
+//! that no file can be crafted whose positions collide; vertex numbers do not depend on it.
 
 use crate::load::geometry::plain_mesh::PlainMesh;
 use bytemuck::Pod;
@@ -13,36 +13,36 @@ use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::Relaxed;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-/// The vertices that places become.
+/// The vertices of all corners.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Welded {
-    /// The corner where each vertex is first met.
+    /// First corner of each vertex.
     pub firsts: Vec<u32>,
-    /// The vertex of each corner.
+    /// Vertex of each corner.
     pub vertices: Vec<u32>,
 }
 
-/// The most corners.
+/// Largest number of corners.
 pub(super) const LARGEST: usize = PlainMesh::LARGEST as usize;
 
-/// Marks the number of a vertex at the corner where it is first met; without it a number is that of such a corner.
+/// Marks the vertex number of a first corner; entries without it are the number of the first corner at the same position.
 const FIRST: u32 = 1 << 31;
 
-/// Corners that one thread deals at a time.
+/// Corners that one task partitions.
 const DEALT: usize = 1 << 16;
 
-/// Corners of a table, about.
+/// Average number of corners of a table.
 const TABLE: usize = 1 << 13;
 
-/// The most tables, as powers of two.
+/// Base-two logarithm of the largest number of tables.
 const TABLES: u32 = 12;
 
-/// Bytes that a corner takes until vertices are known; slots take little beside, since tables are many.
+/// Bytes that a corner takes during welding; the slots take little beside, since tables are many.
 pub(super) const fn cost<P>() -> u64 {
     (size_of::<Card<P>>() + 3 * size_of::<u32>()) as u64
 }
 
-/// Makes one vertex of all corners whose places are equal. There are at most [`LARGEST`].
+/// Makes one vertex of all corners with equal positions. There are at most [`LARGEST`] corners.
 pub(super) fn weld<P: Pod + Eq + Send + Sync>(corners: usize, place: impl Fn(usize) -> P + Sync) -> Welded {
     let hash = Hash { seed: RandomState::new().hash_one(0), bits: (corners / TABLE).max(1).ilog2().min(TABLES) };
     let hands: Vec<Hand<P>> = (0..corners.div_ceil(DEALT))
@@ -61,10 +61,10 @@ pub(super) fn weld<P: Pod + Eq + Send + Sync>(corners: usize, place: impl Fn(usi
     number(&first)
 }
 
-/// Where a place belongs.
+/// Maps positions to tables and slots.
 struct Hash {
     seed: u64,
-    /// Of the number of a table.
+    /// Number of bits of a table's number.
     bits: u32,
 }
 
@@ -73,20 +73,20 @@ impl Hash {
         xxh3_64_with_seed(bytemuck::bytes_of(place), self.seed)
     }
 
-    /// The table of a place.
+    /// Table of a position.
     fn table<P: Pod>(&self, place: &P) -> usize {
-        // As wide as it may be, the shift leaves nothing.
+        // For a single table the shift is by all bits, and leaves 0.
         self.of(place).checked_shr(u64::BITS - self.bits).unwrap_or(0) as usize
     }
 
-    /// Where it is looked for first among so many slots, a power of two; by other bits than those of the table.
+    /// First slot to probe among `slots`, a power of two; uses other bits of the hash than the table.
     #[expect(clippy::cast_possible_truncation, reason = "what is cut off is masked anyway")]
     fn slot<P: Pod>(&self, place: &P, slots: usize) -> usize {
         self.of(place) as usize & (slots - 1)
     }
 }
 
-/// A place, and a corner there.
+/// A position, and a corner there.
 #[derive(Clone, Copy)]
 struct Card<P> {
     place: P,
@@ -94,7 +94,7 @@ struct Card<P> {
 }
 
 impl<P: Pod> Card<P> {
-    /// That of no corner.
+    /// Marks an empty slot.
     fn none() -> Self {
         Self { place: P::zeroed(), corner: u32::MAX }
     }
@@ -104,10 +104,10 @@ impl<P: Pod> Card<P> {
     }
 }
 
-/// Corners that follow each other, sorted by table.
+/// Consecutive corners, sorted by table.
 struct Hand<P> {
     cards: Vec<Card<P>>,
-    /// Where the cards of each table begin, and the end.
+    /// Start of the cards of each table, and the end.
     starts: Vec<u32>,
 }
 
@@ -138,14 +138,14 @@ impl<P: Pod> Hand<P> {
     }
 }
 
-/// The first card of each place of a table, where it is looked for; never more than half full.
+/// Hash table with open addressing: the first card of each position of a table; at most half full.
 struct Slots<P> {
     slots: Vec<Card<P>>,
     places: usize,
 }
 
 impl<P: Pod + Eq> Slots<P> {
-    /// With room for a table, or for so many corners.
+    /// Table with room for [`TABLE`] corners, or for `corners` if fewer.
     fn new(corners: usize) -> Self {
         let room = 2 * corners.clamp(1, TABLE).next_power_of_two();
         Self { slots: vec![Card::none(); room], places: 0 }
@@ -156,7 +156,7 @@ impl<P: Pod + Eq> Slots<P> {
         self.places = 0;
     }
 
-    /// The corner that was first met where this card is; its own if none was.
+    /// First corner at the position of this card; the card's own if there was none before.
     fn first(&mut self, card: Card<P>, hash: &Hash) -> u32 {
         let at = self.find(&card, hash);
         if !self.slots[at].is_none() {
@@ -170,7 +170,7 @@ impl<P: Pod + Eq> Slots<P> {
         card.corner
     }
 
-    /// The slot of a place, or the empty one where it belongs.
+    /// Slot of a position, or the empty slot where it belongs.
     fn find(&self, card: &Card<P>, hash: &Hash) -> usize {
         let mut at = hash.slot(&card.place, self.slots.len());
         while !self.slots[at].is_none() && self.slots[at].place != card.place {
@@ -189,7 +189,7 @@ impl<P: Pod + Eq> Slots<P> {
     }
 }
 
-/// Numbers the corners that are the first in their places, and gives the others the same numbers.
+/// Numbers the first corners of all positions, and gives the other corners the number of their first.
 #[expect(clippy::cast_possible_truncation, reason = "corners are few enough")]
 fn number(first: &[AtomicU32]) -> Welded {
     let firsts_of = |(part, corners): (usize, &[AtomicU32])| -> Vec<u32> {
@@ -219,7 +219,7 @@ mod tests {
     #[test]
     fn vertices_are_numbered_as_they_are_first_met_whatever_the_number_of_corners() {
         let mut random = Random::new(5);
-        // 15,000 different ones are more than a table has room for at first.
+        // 15,000 positions are more than a table initially has room for.
         for (corners, places) in
             [(0, 1), (1, 1), (5, 2), (1000, 1), (15_000, 1 << 24), (70_000, 40_000), (300_000, 1 << 20)]
         {

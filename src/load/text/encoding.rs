@@ -1,11 +1,11 @@
 //! Bytes of a text file -> bytes in a superset of ASCII, without a byte-order mark.
 //!
-//! OBJ and MTL are ASCII with names in whatever encoding the writer's system had. UTF-16 is converted; everything else
-//! is left as it is, and names are decoded when they are used ([`decode_name`]).
+//! OBJ and MTL are ASCII with names in the encoding of the writer's system. UTF-16 is converted; other encodings
+//! are left unchanged, and names are decoded when they are used ([`decode_name`]).
 
 use std::borrow::Cow;
 
-/// Strips a UTF-8 mark and converts UTF-16, with a mark or without.
+/// Strips a UTF-8 byte-order mark and converts UTF-16, with a mark or without.
 pub(in crate::load) fn to_ascii_superset(bytes: &[u8]) -> Cow<'_, [u8]> {
     match bytes {
         [0xef, 0xbb, 0xbf, rest @ ..] => rest.into(),
@@ -22,7 +22,7 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Vec<u8> {
     char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect::<String>().into_bytes()
 }
 
-/// A name or path as text: UTF-8, or else Latin-1, which maps every byte to some character and different bytes to
+/// Decodes a name or path: UTF-8, or else Latin-1, which maps every byte to some character and different bytes to
 /// different characters, so that names in another encoding still match each other.
 pub(in crate::load) fn decode_name(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {

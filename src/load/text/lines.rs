@@ -1,13 +1,13 @@
 //! Text -> logical lines: any line end (LF, CR LF, CR), continuations joined, white space trimmed.
 //!
-//! A backslash at the end of a line joins the next one, as the OBJ text says, except in a comment: exporters write
+//! A backslash at the end of a line joins the next one, as the OBJ specification says, except in a comment: exporters write
 //! paths into comments, and a path may end in a backslash.
 
-/// Reads logical lines one after another; allocates only for joined ones.
+/// Reads logical lines in sequence; allocates only for joined ones.
 pub(in crate::load) struct Lines<'a> {
     rest: &'a [u8],
     joined: Vec<u8>,
-    /// Physical line the next one starts at, from 1.
+    /// Number of the physical line that comes next, from 1.
     number: u32,
 }
 
@@ -16,7 +16,7 @@ impl<'a> Lines<'a> {
         Self { rest: text, joined: Vec::new(), number: 1 }
     }
 
-    /// What has not been read.
+    /// Unread text.
     pub(in crate::load) fn rest(&self) -> &'a [u8] {
         self.rest
     }
@@ -26,13 +26,13 @@ impl<'a> Lines<'a> {
         self.number
     }
 
-    /// Passes a physical line of so many bytes, its end included.
+    /// Skips a physical line of `length` bytes, its end included.
     pub(in crate::load) fn pass(&mut self, length: usize) {
         self.rest = &self.rest[length..];
         self.number = self.number.saturating_add(1);
     }
 
-    /// The next line that is not blank, and the number of the physical line it starts at.
+    /// Next line that is not blank, and the number of its first physical line.
     pub(in crate::load) fn next(&mut self) -> Option<(u32, &[u8])> {
         loop {
             let number = self.number;
@@ -48,7 +48,7 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// Collects `first` and the lines it continues on.
+    /// Collects `first` and the lines that continue it.
     fn join(&mut self, first: &[u8]) {
         self.joined.clear();
         self.joined.extend_from_slice(&first[..first.len() - 1]);
@@ -64,7 +64,7 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// The next physical line, trimmed.
+    /// Next physical line, trimmed.
     fn physical(&mut self) -> Option<&'a [u8]> {
         if self.rest.is_empty() {
             return None;
@@ -77,19 +77,19 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// Whether the next line belongs to this one, which is not blank: it ends in a backslash that is no part of a comment.
+/// Whether this non-blank line is continued on the next: it ends in a backslash that is not part of a comment.
 fn is_continued(line: &[u8]) -> bool {
     if line[line.len() - 1] != b'\\' {
         return false;
     }
     match keyword(line) {
         (b"v" | b"vt" | b"vn" | b"f" | b"fo" | b"l" | b"p" | b"s", rest) => comment(rest).is_none(),
-        // Names may hold what starts a comment elsewhere.
+        // Names may hold the character that starts a comment elsewhere.
         _ => line[0] != b'#' && without_comment(line).len() == line.len(),
     }
 }
 
-/// Where a comment starts behind numbers. (`1.#IND` holds none: so did C libraries write infinities.)
+/// Start of a comment behind numbers. (`1.#IND` holds none: C libraries print infinities so.)
 fn comment(rest: &[u8]) -> Option<usize> {
     let starts = |at: &usize| rest[*at] == b'#' && (*at == 0 || rest[*at - 1] != b'.');
     if rest.contains(&b'#') { (0..rest.len()).find(starts) } else { None }
@@ -101,12 +101,12 @@ pub(in crate::load) fn keyword(line: &[u8]) -> (&[u8], &[u8]) {
     (&line[..end], line[end..].trim_ascii())
 }
 
-/// The words of `rest` up to a comment.
+/// Words of `rest` up to a comment.
 pub(in crate::load) fn words(rest: &[u8]) -> impl Iterator<Item = &[u8]> {
     rest[..comment(rest).unwrap_or(rest.len())].split(u8::is_ascii_whitespace).filter(|w| !w.is_empty())
 }
 
-/// A name without the comment that may follow it: a `#` between white space starts one (names such as `Color#1` keep
+/// Name without the comment that may follow it: a `#` between white space starts one (names such as `Color#1` keep
 /// theirs).
 pub(in crate::load) fn without_comment(name: &[u8]) -> &[u8] {
     let starts = |w: &[u8]| w[0].is_ascii_whitespace() && w[1] == b'#' && w[2].is_ascii_whitespace();

@@ -1,11 +1,11 @@
-//! Text -> words between blanks, which may stand on any lines, and the numbers that they are.
+//! Text -> words separated by white space, on any lines, and their numbers.
 
 use crate::load::number::{self, Respelled};
 
-/// Where the reading of a text is.
+/// Cursor over the words of a text.
 pub(in crate::load) struct Words<'a> {
     pub bytes: &'a [u8],
-    /// The next byte.
+    /// Offset of the next byte.
     pub at: usize,
     /// Line of the word read last, from 1.
     pub line: u32,
@@ -15,22 +15,22 @@ pub(in crate::load) struct Words<'a> {
 }
 
 impl<'a> Words<'a> {
-    /// The words from byte `at` on, which stands in this line.
+    /// Cursor at byte `at`, which lies on this line.
     pub(in crate::load) fn new(bytes: &'a [u8], at: usize, line: u32) -> Self {
         Self { bytes, at, line, places: 0, respelled: Respelled::default() }
     }
 
-    /// What has not been read.
+    /// Unread bytes.
     #[inline]
     pub(in crate::load) fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.at..).unwrap_or_default()
     }
 
-    /// Goes to the next word; whether there is one.
+    /// Advances to the next word; returns whether there is one.
     #[inline]
     pub(in crate::load) fn find(&mut self) -> bool {
         while let Some(&b) = self.bytes.get(self.at).filter(|b| b.is_ascii_whitespace()) {
-            // CR LF is one line end, counted at its second half.
+            // CR LF is one line end, counted at the LF.
             let ends = b == b'\n' || (b == b'\r' && self.bytes.get(self.at + 1) != Some(&b'\n'));
             self.line = self.line.saturating_add(u32::from(ends));
             self.at += 1;
@@ -38,22 +38,22 @@ impl<'a> Words<'a> {
         self.at < self.bytes.len()
     }
 
-    /// The next word.
+    /// Reads the next word.
     pub(in crate::load) fn next(&mut self) -> Option<&'a [u8]> {
         self.find().then(|| self.take())
     }
 
-    /// The next word of this line.
+    /// Reads the next word on this line.
     pub(in crate::load) fn next_in_line(&mut self) -> Option<&'a [u8]> {
         let is_blank = |b: &&u8| b.is_ascii_whitespace() && !ends_line(b);
         self.at += self.rest().iter().take_while(is_blank).count();
         Some(self.take()).filter(|word| !word.is_empty())
     }
 
-    /// The next word, which must be a number.
+    /// Reads the next word, which must be a number.
     ///
     /// # Errors
-    /// The word that is none; the empty one where there is no more.
+    /// The word that is not a number; empty at the end of the text.
     #[inline]
     pub(in crate::load) fn number(&mut self) -> Result<f64, &'a [u8]> {
         self.find();
@@ -66,7 +66,7 @@ impl<'a> Words<'a> {
         self.respelled.value(self.line, word).ok_or(word)
     }
 
-    /// What there is up to the end of the line.
+    /// Reads the rest of the line.
     pub(in crate::load) fn rest_of_line(&mut self) -> &'a [u8] {
         self.take_until(ends_line)
     }

@@ -1,4 +1,4 @@
-//! What corners name.
+//! Data named by corners.
 
 use crate::load::Limits;
 use crate::load::geometry::{NONE, Soup, color};
@@ -57,7 +57,7 @@ fn a_file_without_faces_is_empty() {
     assert!(of(TRIANGLE).corners.is_empty());
 }
 
-/// Corners as (place, coordinate, normal), read by the crate `tobj`.
+/// Corners as (position, coordinate, normal), read by the crate `tobj`.
 fn read_by_tobj(text: &str) -> Vec<([f64; 3], [f64; 2], [f64; 3])> {
     let options = tobj::LoadOptions { triangulate: false, single_index: false, ..Default::default() };
     let none = |_: &Path| Err(tobj::LoadError::OpenFileFailed);

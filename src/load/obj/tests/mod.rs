@@ -91,7 +91,7 @@ fn a_far_model_has_the_same_coordinates_as_one_at_the_origin() {
 
 #[test]
 fn a_far_scan_is_off_by_no_more_than_half_a_unit_of_its_last_digit() {
-    // Points as a scanner writes them: six decimals, on a sphere.
+    // Points in a scanner's format: six decimals, on a sphere.
     let points: Vec<DVec3> = (0..300)
         .map(|i| {
             let (a, b) = (f64::from(i) * 0.7, f64::from(i) * 0.01 - 1.5);
@@ -156,7 +156,7 @@ fn a_concave_face_is_cut_inside_and_a_whole_one_stays_whole() {
     assert_eq!((round(256), round(257)), ((0, 1), (255, 0)), "every test looks at all corners");
     let bent = with(text.replace("1 1 0", "1 1 0.01").as_bytes(), &whole);
     assert_eq!((bent.scene.meshes[0].triangles.len(), bent.scene.meshes[0].polygons.len()), (2, 0));
-    // A corner off by one unit of the last digit is off the plane by a quarter of it; half a unit is still planar.
+    // A corner off by one unit of the last digit is off the plane by a quarter of it; half a unit still counts as planar.
     let raised = |z: &str| format!("v 0 0 0.0000\nv 4 0 0\nv 4 4 {z}\nv 0 4 0\nf 1 2 3 4");
     assert_eq!(with(raised("0.0002").as_bytes(), &whole).scene.meshes[0].polygons.len(), 1);
     assert_eq!(with(raised("0.0003").as_bytes(), &whole).scene.meshes[0].polygons.len(), 0);
@@ -182,7 +182,7 @@ fn smoothing_groups_share_normals_inside_and_not_across() {
         let flat = of(&format!("{text}{off}f 1 2 3\nf 2 1 4"));
         assert!(flat.scene.meshes[0].normals.is_empty());
     }
-    // A smoothing group goes on across materials and objects.
+    // A smoothing group extends across materials and objects.
     let across = of(&format!("{text}s 1\nusemtl a\nf 1 2 3\nusemtl b\nf 2 1 4"));
     assert_eq!(across.scene.meshes[0].normals[0], across.scene.meshes[1].normals[1]);
 }
@@ -358,7 +358,7 @@ fn vertices_alone_are_points_in_their_colours_lit_by_their_normals() {
     }
     let is_lit = |loaded: &Loaded| loaded.scene.materials.iter().all(|m| m.reflection != Reflection::Unlit);
     assert!(!is_lit(&loaded) && is_lit(&cloud("vn 0 0 1\nvn 0 0 1\nvn 0 0 1\n")));
-    // Where something joins vertices, or was meant to, those that are left are nothing.
+    // Where vertices are joined, or were meant to be, unused ones are not drawn.
     assert_eq!(cloud("f 1 2 3\n").facts.wires.points, 0);
     assert_eq!(cloud("f 1 2\n").facts.wires.points, 0);
 }

@@ -1,4 +1,4 @@
-//! Whole files, made in memory.
+//! Whole files, built in memory.
 
 use super::*;
 use crate::load::{Limits, Polygons};
@@ -20,7 +20,7 @@ fn fault(bytes: &[u8]) -> String {
     of(bytes, &LoadOptions::default()).unwrap_err()
 }
 
-/// Kinds of values and what they hold, which every encoding writes in its own way.
+/// A value, which every encoding writes in its own way.
 enum Value {
     Byte(u8),
     Int(i32),
@@ -28,7 +28,7 @@ enum Value {
     Double(f64),
 }
 
-/// A file with this header behind the line `format`.
+/// File with this header behind the line `format`.
 fn encoded(format: &str, header: &str, values: &[Value]) -> Vec<u8> {
     let mut out = format!("ply\nformat {format} 1.0\n{header}\nend_header\n").into_bytes();
     for value in values {
@@ -51,7 +51,7 @@ fn encoded(format: &str, header: &str, values: &[Value]) -> Vec<u8> {
 
 pub(super) const FORMATS: [&str; 3] = ["ascii", "binary_little_endian", "binary_big_endian"];
 
-/// A square of four vertices with everything that is read, some things that are not, and a triangle beside it.
+/// A square of four vertices with every property that is read, some that are not, and a triangle beside it.
 pub(super) fn square(format: &str) -> Vec<u8> {
     let header = "comment made by hand\nelement vertex 5\nproperty float x\nproperty float y\nproperty double z\n\
         property float nx\nproperty float ny\nproperty float nz\nproperty float s\nproperty float t\n\
@@ -94,7 +94,7 @@ fn every_encoding_gives_the_same_scene() {
 
 #[test]
 fn triangles_alone_are_the_same_in_every_encoding_and_among_other_faces() {
-    // More than one thread reads at a time, with something in each row that is not read.
+    // Enough rows for several threads, each with a property that is not read.
     let header = |faces: u32| {
         format!(
             "element vertex 9000\nproperty float x\nproperty double y\nproperty float z\nproperty uchar quality\n\
@@ -183,7 +183,7 @@ fn words_may_stand_on_any_lines_and_lines_end_anyhow() {
         assert_eq!(format!("{:?}", loaded.scene), expected);
         assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
     }
-    // A comment in no encoding that we know is still a comment.
+    // A comment in an unknown encoding is still a comment.
     let mut file = b"ply\nformat ascii 1.0\ncomment caf\xe9\n".to_vec();
     file.extend(text("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").split_off("ply\nformat ascii 1.0\n".len()));
     assert_eq!(format!("{:?}", plain(&file).scene), expected);
@@ -291,7 +291,7 @@ fn vertices_that_nothing_joins_are_points_lit_by_their_normals() {
     let cloud = plain(format!("{}0 0 0 255 0 0 0 0 2\n3 4 0 0 255 0 1 0 0\n", header(normals)).as_bytes());
     let mesh = &cloud.scene.meshes[0];
     assert_eq!((mesh.triangles.len(), mesh.normals[0], mesh.normals[4]), (4, Vec3::Z, Vec3::X));
-    // The one without looks where the others do in the mean; where most have none nothing is said of light.
+    // The vertex without a normal takes the mean of the others; where most have none, none is used.
     let lit = |normals_of: [&str; 3]| {
         let header = header(normals).replace("vertex 2", "vertex 3");
         let vertex = |(i, normal): (usize, &str)| format!("{i} 0 0 255 0 0 {normal}\n");
@@ -338,7 +338,7 @@ fn faults_name_the_line_or_the_byte() {
 #[test]
 fn counts_in_a_header_take_no_memory() {
     let claims = |line: &str| format!("ply\nformat binary_little_endian 1.0\nelement {line}\nend_header\nabcd");
-    // Nothing to read however often: nothing happens.
+    // No bytes per row, however many rows: nothing to read.
     assert!(of(claims("thing 18446744073709551615").as_bytes(), &LoadOptions::default()).is_ok());
     for line in [
         "vertex 18446744073709551615\nproperty float x\nproperty float y\nproperty float z",
@@ -359,7 +359,7 @@ fn lists_and_headers_take_no_memory_that_was_not_granted() {
         property uchar z\nelement face 1\nproperty list uint uchar vertex_indices\nend_header\n";
     let bytes = [header.as_bytes(), &[0, 0, 0, 1, 0, 0, 0, 1, 0], &100_000_u32.to_le_bytes(), &[1; 100_000]].concat();
     let small = LoadOptions { limits: Limits { memory: 1_000_000, ..Limits::default() }, ..LoadOptions::default() };
-    // The file, three vertices, and of the list what a face of so many corners takes.
+    // The file, three vertices, and for the list the memory of a face with that many corners.
     let over = of(&bytes, &small).unwrap_err();
     assert!(over.starts_with("a.ply: 4000056 bytes are needed"), "{over}");
     assert!(of(&bytes, &LoadOptions::default()).is_ok());
@@ -369,7 +369,7 @@ fn lists_and_headers_take_no_memory_that_was_not_granted() {
     assert!(fault(many.as_bytes()).contains("more than 4096 elements, properties and pictures"));
 }
 
-/// A triangle as text, with these lines of the header before the faces, and more to say of its vertices and its face.
+/// A triangle as text, with `comment` before the faces in the header, and further values of its vertices and its face.
 fn triangle(vertex: &str, comment: &str, face: &str, of_vertex: [&str; 3], of_face: &str) -> Loaded {
     let [a, b, c] = of_vertex;
     let text = format!(

@@ -6,10 +6,10 @@ use crate::math::{Vec2, Vec3, Vec4};
 use crate::scene::Mesh;
 use crate::scene::color::from_srgb;
 
-/// A picture that is there, as seen from the folder of a file without one.
+/// An existing picture, relative to the folder of a file without one.
 const PICTURE: &str = "models/pictures/rainbow.jpg";
 
-/// Two triangles over an edge, their texture coordinates and their colours.
+/// Two triangles that share an edge, with texture coordinates and colours.
 pub(in crate::load::ply) fn roof(format: &str) -> Vec<u8> {
     let header = format!(
         "comment TextureFile {PICTURE}\ncomment TextureFile models/none.png\n\
@@ -39,7 +39,7 @@ fn codes(loaded: &Loaded) -> Vec<&str> {
     loaded.warnings.iter().map(|w| w.code).collect()
 }
 
-/// Three triangles of a fan, with these lines before their corners' header, and more to say of each.
+/// Three triangles of a fan, with `before` ahead of the corners in the header, and further values of each face.
 fn fan(before: &str, face: &str, of_faces: [&str; 3]) -> Loaded {
     let [a, b, c] = of_faces;
     let text = format!(
@@ -50,7 +50,7 @@ fn fan(before: &str, face: &str, of_faces: [&str; 3]) -> Loaded {
     plain(text.as_bytes())
 }
 
-/// The colours of the corners of each triangle.
+/// Colours of the corners of each triangle.
 fn corners(mesh: &Mesh) -> Vec<[Vec4; 3]> {
     mesh.triangles.iter().map(|t| t.map(|i| mesh.colors[i as usize])).collect()
 }
@@ -237,7 +237,7 @@ fn coordinates_without_a_picture_and_pictures_without_a_face_are_told() {
 #[test]
 fn pictures_and_colours_take_no_memory_that_was_not_granted() {
     let memory = |memory| LoadOptions { limits: Limits { memory, ..Limits::default() }, ..LoadOptions::default() };
-    // The file, four vertices, two faces with their colours and coordinates; then the vertices that these make, and a picture.
+    // Memory of the file, four vertices, two faces with colours and coordinates; then of their vertices, and of a picture.
     let told = [1500, 2400, 100_000].map(|bytes| of(&roof("ascii"), &memory(bytes)));
     assert!(told[0].as_ref().is_err_and(|e| e.ends_with("raise --max-memory")), "{:?}", told[0].as_ref().err());
     assert!(told[1].as_ref().is_err_and(|e| e.ends_with("raise --max-memory")), "{:?}", told[1].as_ref().err());
