@@ -13,29 +13,29 @@ use crate::scene::{Mesh, Polygon};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// Faces that one thread looks at at a time.
+/// Number of faces per parallel task.
 const FACES: usize = 1 << 12;
 
-/// The meshes of a file, and what became of its faces.
+/// Meshes of a file, and statistics of its faces.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Assembled {
-    /// One for each of [`Geometry::runs`] that has anything to draw: its index, and the mesh without a material.
+    /// Mesh without a material, and its index into [`Geometry::runs`], for each run that has anything to draw.
     pub meshes: Vec<(u32, Mesh)>,
-    /// Faces drawn.
+    /// Number of faces drawn.
     pub faces: u64,
-    /// Faces with a corner that is no finite number: how many, and the line of the first.
+    /// Faces with a corner that is not finite: count, and the line of the first.
     pub not_finite: (u64, u32),
-    /// Faces with fewer than three different corners.
+    /// Faces with fewer than three different corners: likewise.
     pub collapsed: (u64, u32),
-    /// Faces that have them, but rounding has made them fewer.
+    /// Faces that have fewer than three different corners only after rounding.
     pub rounded: (u64, u32),
-    /// Faces whose boundary crosses itself.
+    /// Faces whose boundary intersects itself.
     pub crossing: (u64, u32),
-    /// Faces turned round to agree with their normals.
+    /// Faces flipped to agree with their normals.
     pub turned: (u64, u32),
 }
 
-/// Builds the meshes. `flatness`: how far corners may lie from the plane of a face that is kept whole.
+/// Builds the meshes. `flatness`: largest distance of a corner from the plane of a face that is kept whole.
 pub(super) fn assemble(
     geometry: &Geometry,
     soup: &Soup,
@@ -68,18 +68,18 @@ pub(super) fn assemble(
     out
 }
 
-/// Whether triangles can be drawn as they are: all of them, and on all of these positions.
+/// Whether all triangles can be drawn unchanged, on exactly these positions.
 pub(super) fn stay_as_they_are(triangles: &[[u32; 3]], positions: &[Vec3]) -> bool {
     let is_wide = |corners: &[u32; 3]| {
         let [a, b, c] = corners.map(|i| positions[i as usize]);
         a != b && b != c && c != a
     };
-    // What nothing uses has no place.
+    // Positions that nothing uses are not finite.
     positions.par_iter().with_min_len(FACES).all(|p| p.is_finite())
         && triangles.par_iter().with_min_len(FACES).all(is_wide)
 }
 
-/// The mesh of [`Geometry::triangles`] that can be drawn as they are.
+/// Mesh of [`Geometry::triangles`] that can be drawn unchanged.
 pub(super) fn as_they_are(geometry: &mut Geometry, soup: &Soup, placed: &Placed) -> Assembled {
     let triangles = std::mem::take(&mut geometry.triangles);
     let faces = triangles.len() as u64;
@@ -89,7 +89,7 @@ pub(super) fn as_they_are(geometry: &mut Geometry, soup: &Soup, placed: &Placed)
     Assembled { meshes: vec![(0, mesh)], faces, ..Assembled::default() }
 }
 
-/// The faces that can be drawn; mostly all, which are not copied.
+/// Faces that can be drawn; not copied where all can, which is usual.
 fn keep<'s>(geometry: &'s Geometry, soup: &Soup, positions: &[Vec3], out: &mut Assembled) -> Cow<'s, [Face]> {
     let corners = |face: &Face| soup.corners.get(face.corners()).unwrap_or_default();
     let place = |c: &Corner| positions[c.position as usize];
@@ -126,7 +126,7 @@ fn count((number, line): &mut (u64, u32), face: &Face) {
     *number += 1;
 }
 
-/// Faces sorted by run, in the file's order within each.
+/// Groups faces by run, in the file's order within each.
 fn by_run(faces: &[Face], runs: usize) -> Vec<(u32, Cow<'_, [Face]>)> {
     if runs == 1 {
         return vec![(0, Cow::Borrowed(faces))];
@@ -138,7 +138,7 @@ fn by_run(faces: &[Face], runs: usize) -> Vec<(u32, Cow<'_, [Face]>)> {
     (0..).zip(lists.into_iter().map(Cow::Owned)).collect()
 }
 
-/// `object/group`, whichever there is.
+/// `object/group`, or the one of them that is set.
 pub(super) fn name(geometry: &Geometry, run: u32) -> String {
     let run = geometry.runs[run as usize];
     let name = |id: u32| geometry.names[id as usize].as_str();
@@ -150,7 +150,7 @@ pub(super) fn name(geometry: &Geometry, run: u32) -> String {
     }
 }
 
-/// What makes a vertex besides its position: texture coordinate and normal, each an index or [`NONE`].
+/// Attributes that distinguish vertices of one position: texture coordinate and normal, each an index or [`NONE`].
 pub(super) type Key = (u32, u32);
 
 struct Builder<'a> {
@@ -161,7 +161,7 @@ struct Builder<'a> {
     flatness: Option<f64>,
     vertices: Pairs<Key>,
     clipper: EarClipper,
-    /// Corners of the face at hand: places, vertices of the mesh, and the triangles cut.
+    /// Corners of the current face: positions, vertices of the mesh, and the triangles it is cut into.
     ring: Vec<DVec3>,
     indices: Vec<u32>,
     cut: Vec<[u32; 3]>,
@@ -179,14 +179,14 @@ impl Builder<'_> {
             self.face(face, shaded, out);
         }
         self.fill(faces, shaded);
-        // Triangle i is face i: nothing to say.
+        // Triangle i is face i: the table is redundant.
         if self.mesh.face_of_triangle.iter().zip(0..).all(|(&face, i)| face == i) {
             self.mesh.face_of_triangle.clear();
         }
         std::mem::take(&mut self.mesh)
     }
 
-    /// The normal of a corner: the file's, counted first, or that of a smoothing group, counted on.
+    /// Index of a corner's normal: the file's come first, then those of smoothing groups.
     fn normal_number(&self, at: usize) -> u32 {
         match (self.soup.corners[at].normal, self.smooth.of_corner.get(at)) {
             (NONE, Some(&smooth)) if smooth != NONE => self.first_smooth() + smooth,
@@ -207,7 +207,7 @@ impl Builder<'_> {
     fn face(&mut self, face: &Face, shaded: bool, out: &mut Assembled) {
         self.ring.clear();
         self.indices.clear();
-        // Of a triangle places are asked for only to compare it with its normals.
+        // Positions of a triangle are needed only to compare it with its normals.
         let needs_places = face.arity > 3 || !self.soup.normals.is_empty();
         for at in face.corners() {
             let Corner { position, uv, .. } = self.soup.corners[at];
@@ -232,7 +232,7 @@ impl Builder<'_> {
         }
 
         if let [a, b, c] = self.indices[..] {
-            // Nothing to cut, and faces with equal corners are gone.
+            // Nothing to cut, and faces with equal corners were dropped.
             self.mesh.triangles.push([a, b, c]);
             self.mesh.face_of_triangle.push(face.number);
             out.faces += 1;
@@ -251,10 +251,10 @@ impl Builder<'_> {
         out.faces += 1;
     }
 
-    /// Reverses the face when the normals the file gives point to its back.
+    /// Reverses the face when the normals of the file point to its back.
     ///
-    /// Which side is the front decides on which side of the glass a ray is; where winding and normals disagree,
-    /// whoever wrote the file has looked at the normals.
+    /// The front decides on which side of glass a ray is; where winding and normals disagree,
+    /// the author of the file has looked at the normals.
     fn turn_to_normals(&mut self, face: &Face) -> bool {
         if self.soup.normals.is_empty() {
             return false;
@@ -282,7 +282,7 @@ impl Builder<'_> {
         self.mesh.polygons.push(Polygon { first, len, face });
     }
 
-    /// Fills the vertex arrays that the triangles point into.
+    /// Fills the vertex arrays of the mesh.
     fn fill(&mut self, faces: &[Face], shaded: bool) {
         fill_vertices(&mut self.mesh, &self.vertices, self.soup, self.positions);
         if shaded {
@@ -305,7 +305,7 @@ impl Builder<'_> {
         self.mesh.normals = normals;
     }
 
-    /// The normal of a face of this mesh; +z for one without area, where it is never seen.
+    /// Normal of a face of this mesh; +z for a face without area, which is never seen.
     fn flat_normal(&self, faces: &[Face], number: u32) -> Vec3 {
         let Ok(i) = faces.binary_search_by_key(&number, |f| f.number) else { return Vec3::Z };
         let place = |c: &Corner| self.positions[c.position as usize].as_dvec3();
@@ -314,7 +314,7 @@ impl Builder<'_> {
     }
 }
 
-/// Fills the places, texture coordinates and colours of a mesh's vertices.
+/// Fills the positions, texture coordinates and colours of a mesh's vertices.
 pub(super) fn fill_vertices(mesh: &mut Mesh, vertices: &Pairs<Key>, soup: &Soup, positions: &[Vec3]) {
     mesh.positions = vertices.iter().map(|(p, _)| positions[p as usize]).collect();
     if vertices.iter().any(|(_, (uv, _))| uv != NONE) {
@@ -329,7 +329,7 @@ pub(super) fn fill_vertices(mesh: &mut Mesh, vertices: &Pairs<Key>, soup: &Soup,
     mesh.colors = colors(soup, positions.par_iter().map(|&p| p as usize));
 }
 
-/// The colours of vertices at these positions; none where all are white and opaque.
+/// Colours of the vertices at these positions; empty where all are white and opaque.
 pub(super) fn colors(soup: &Soup, positions: impl IndexedParallelIterator<Item = usize> + Clone) -> Vec<Vec4> {
     let positions = positions.with_min_len(FACES);
     let is_colored = positions.clone().any(|p| soup.colors.get(p).is_some_and(|&c| c != [1.0; 3]));
@@ -349,7 +349,7 @@ fn is_flat(ring: &[DVec3], flatness: f64) -> bool {
     ring.iter().all(|&p| (p - mean).dot(normal).abs() <= flatness)
 }
 
-/// How far corners of a planar face may lie from its plane: half a unit of the file's last digit, or four units of
+/// Largest distance of the corners of a planar face from its plane: half a unit of the file's last digit, or four units of
 /// rounding of the largest coordinate, whichever is larger.
 ///
 /// Digits so coarse that half a unit would bend a face visibly (over 2⁻¹² of the model's size) were not rounded but

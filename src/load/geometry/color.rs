@@ -8,9 +8,9 @@ use std::sync::LazyLock;
 
 /// Linear RGBA of a vertex colour as written.
 ///
-/// Programs that write them (scanners, sculpting and mesh repair programs) take them from 8-bit pictures and divide by
-/// 255, so they are sRGB-coded, unlike the colours of MTL files. Where codes are those of bytes, which nearly all are, they are
-/// looked up: as exact, and much faster.
+/// Programs that write vertex colours (scanners, sculpting and mesh repair programs) take them from 8-bit pictures and divide
+/// by 255, so they are sRGB-coded, unlike the colours of MTL files. Codes of bytes, which nearly all are, are
+/// looked up in a table: as exact, and much faster.
 pub(in crate::load) fn linear(color: [f32; 3]) -> Vec4 {
     static OF_BYTES: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|byte| decode(of_byte(byte))));
     let part = |code: f32| {
@@ -31,13 +31,13 @@ fn decode(code: f32) -> f32 {
     from_srgb([code; 3]).x
 }
 
-/// Opacities of vertices, 0…1; none where all are opaque, or [`are_all_clear`].
+/// Opacities of vertices, 0…1; empty where all are opaque, or [`are_all_clear`].
 pub(in crate::load) fn opacities(colors: &[[f32; 4]]) -> Vec<f32> {
     let is_see_through = colors.iter().any(|c| opacity(c) < 1.0) && !are_all_clear(colors);
     if is_see_through { colors.iter().map(opacity).collect() } else { Vec::new() }
 }
 
-/// Whether all opacities are 0. They mean something else then: nobody writes a mesh that cannot be seen.
+/// Whether all opacities are 0. Then they must mean something else: nobody writes an invisible mesh.
 pub(in crate::load) fn are_all_clear(colors: &[[f32; 4]]) -> bool {
     !colors.is_empty() && colors.iter().all(|c| opacity(c) == 0.0)
 }
@@ -46,21 +46,21 @@ fn opacity(color: &[f32; 4]) -> f32 {
     if color[3].is_nan() { 1.0 } else { color[3].clamp(0.0, 1.0) }
 }
 
-/// How vertex colours are written.
+/// Encoding of vertex colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::load) enum Coding {
-    /// As 0…1.
+    /// 0…1.
     Units,
-    /// As 0…255.
+    /// 0…255.
     Bytes,
-    /// As neither; what is over 1 or below 0 is cut off when it is decoded.
+    /// Neither; values above 1 or below 0 are clamped when they are decoded.
     Beyond,
 }
 
-/// Makes colours as written 0…1, and white where there is none (not finite). A fourth number of each, its opacity, is
-/// written as they are where any is above 1, and else from 0 to 1.
+/// Normalizes colours to 0…1, and to white where they are not finite. A fourth channel, the opacity, is scaled like the
+/// colours where any opacity is above 1, and else taken as 0…1.
 pub(in crate::load) fn settle<const N: usize>(colors: &mut [[f32; N]]) -> Coding {
-    /// What rounding may add to full light.
+    /// Amount that rounding may exceed full light by.
     const ROUNDED: f32 = 1e-3;
     let (bytes, mut beyond) = (are_bytes(colors), false);
     let unit = |bytes: bool| if bytes { 255.0 } else { 1.0 };
@@ -83,7 +83,7 @@ pub(in crate::load) fn settle<const N: usize>(colors: &mut [[f32; N]]) -> Coding
 }
 
 impl Coding {
-    /// What is told of colours that are not simply 0…1, by these codes for bytes and for what is beyond.
+    /// Warning about colours that are not 0…1; `codes` are those for bytes and for values beyond.
     pub(in crate::load) fn warning(self, codes: [&'static str; 2], file: &Path) -> Option<Diagnostic> {
         let (code, text) = match self {
             Self::Units => return None,
@@ -94,10 +94,10 @@ impl Coding {
     }
 }
 
-/// Whether colours were written as 0 … 255: whole numbers, or their means, of which most are far above 1, and not light that
-/// is somewhat over-exposed.
+/// Whether colours were written as 0 … 255: integers, or averages of integers mostly far above 1, in contrast to
+/// slightly over-exposed light.
 fn are_bytes<const N: usize>(colors: &[[f32; N]]) -> bool {
-    /// What no number over 1 is that stands for bright light.
+    /// Values above this do not occur as over-exposed light.
     const BRIGHT: f32 = 8.0;
     let all = || colors.iter().flat_map(|color| color.iter().take(3)).filter(|c| c.is_finite());
     let greatest = all().copied().fold(0.0, f32::max);

@@ -1,4 +1,4 @@
-//! Faces, points and lines -> scene: the way of OBJ files, and of files that hold geometry alone.
+//! Faces, points and lines -> scene: for OBJ files, and for files that hold geometry alone.
 
 use super::Geometry;
 use super::{assemble, up, wire_statements};
@@ -14,26 +14,26 @@ use crate::scene::{AlphaMode, Instance, Mesh, Scene, UpAxis};
 use assemble::Assembled;
 use std::path::Path;
 
-/// What a kind of file is called, and how its messages are.
+/// Names and message codes of a kind of file.
 pub(in crate::load) struct Kind<'a> {
-    /// For reports.
+    /// Name of the format for reports.
     pub format: &'a str,
-    /// Codes of what becomes of faces, in the order of [`warn_of_faces`].
+    /// Diagnostic codes for faces, in the order of [`warn_of_faces`].
     pub of_faces: [&'static str; 5],
-    /// Code of a file without any.
+    /// Diagnostic code for a file without faces.
     pub no_faces: &'static str,
-    /// How the place of a face is named: by its line, or by its number.
+    /// Formats the place of a face: its line, or its number.
     pub place: fn(u32) -> String,
-    /// The up axis where nothing speaks for one, and why.
+    /// Default up axis, and the reason.
     pub otherwise: (UpAxis, &'a str),
-    /// Makes the materials that runs name, of the files that the geometry does.
+    /// Makes the materials that runs name, from the files that the geometry names.
     pub materials: mtl::Make,
 }
 
-/// Makes the scene; `warnings` go on from those of reading.
+/// Makes the scene; `warnings` continue those of reading.
 ///
 /// # Errors
-/// When it would take more than is left of the budget.
+/// When memory would exceed the budget.
 pub(in crate::load) fn finish(
     mut geometry: Geometry,
     kind: &Kind,
@@ -65,7 +65,7 @@ pub(in crate::load) fn finish(
         warnings.push(Diagnostic::new(kind.no_faces, file, "", text));
     }
 
-    // Which way is up, what everything is made of, and where it stands.
+    // Determine the up axis, the materials and the placement.
     let (runs, meshes): (Vec<u32>, Vec<Mesh>) = std::mem::take(&mut assembled.meshes).into_iter().unzip();
     let (guessed, reason) = up::guess(&geometry.comments, &meshes, &placed, kind.otherwise);
     let name = |run: &u32| geometry.runs[*run as usize].material.map(|id| geometry.names[id as usize].as_str());
@@ -103,8 +103,8 @@ pub(in crate::load) fn finish(
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }
 
-/// Puts points and lines into the scene, moved to where the file has them; warnings of those that are not drawn as
-/// they are.
+/// Adds points and lines to the scene, moved to their place in the file; warns of those that are not drawn as
+/// specified.
 fn draw(
     wires: &[Wires],
     center: DVec3,
@@ -120,10 +120,10 @@ fn draw(
     wires::draw(wires, &places, scene, budget, facts, file, widths).map_err(|over| Diagnostic::over_budget(file, over))
 }
 
-/// Bytes that making tangents takes a corner; as a vertex of its own it has a place, a normal, coordinates and a colour.
+/// Bytes per corner for making tangents; a corner that becomes a vertex has a position, a normal, coordinates and a colour.
 const OF_TANGENTS: u64 = tangents::OF_CORNER + 4 * 16;
 
-/// One instance of each mesh, moved to where the file has it. Where normals will be made smooth, tangents wait for them.
+/// Scene with one instance of each mesh, moved to its place in the file. Meshes with smooth normals get tangents later.
 ///
 /// # Errors
 /// When tangents for normal maps would take more than is left of `budget`.
@@ -152,7 +152,7 @@ fn scene(
     Ok(Scene { meshes, instances, materials, textures, bitmaps, up, ..Scene::default() })
 }
 
-/// Tells what became of faces.
+/// Adds warnings about dropped and changed faces.
 fn warn_of_faces(assembled: &Assembled, kind: &Kind, file: &Path, warnings: &mut Warnings) {
     let told = [
         (assembled.not_finite, "a face is dropped: a corner is not a finite number, or over 1e18"),
@@ -181,7 +181,7 @@ fn dropped(geometry: &Geometry, assembled: &Assembled) -> Vec<(String, u64)> {
     reasons.into_iter().filter(|r| r.1 > 0).map(|(reason, count)| (reason.into(), count)).collect()
 }
 
-/// The comment by which a program names itself, if any.
+/// Comment by which a program names itself, if any.
 fn generator(comments: &[String]) -> String {
     const WORDS: [&str; 12] = [
         "export",

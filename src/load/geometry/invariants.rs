@@ -1,8 +1,8 @@
-//! What holds of every scene that is loaded, whatever was in the file.
+//! Invariants of every loaded scene, whatever the file.
 
 use crate::load::Loaded;
 
-/// Every index points at something, every array is empty or full, every number is finite.
+/// Asserts that every index is in range, every array is empty or full, and every number is finite.
 pub(in crate::load) fn assert_sound(loaded: &Loaded) {
     let scene = &loaded.scene;
     assert_eq!(scene.meshes.len(), scene.instances.len());

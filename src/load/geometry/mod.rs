@@ -1,9 +1,9 @@
 //! Geometry without a hierarchy -> scene: vertices, faces, points and lines, in runs that share a name and a material.
 //!
-//! The text of an OBJ leaves it ([`obj`](super::obj)), files of other formats hold nothing else ([`plain_mesh`]). It is
-//! centred in `f64` and rounded ([`place`](super::place)), and becomes one mesh and one instance for each run (`assemble`),
-//! points and lines (`wire_statements`) get a width ([`wires`](super::wires)), materials come from the MTL files or
-//! pictures that it names ([`mtl`](super::mtl), `plain_mesh::pictures`); `finish` is the whole way.
+//! It comes from the statements of an OBJ ([`obj`](super::obj)), or is all that files of other formats hold ([`plain_mesh`]).
+//! It is centred in `f64` and rounded ([`place`](super::place)), and becomes one mesh and one instance for each run
+//! (`assemble`); points and lines (`wire_statements`) get a width ([`wires`](super::wires)); materials come from the MTL files
+//! or pictures that it names ([`mtl`](super::mtl), `plain_mesh::pictures`); `finish` runs all these steps.
 
 mod assemble;
 pub(super) mod color;
@@ -21,76 +21,76 @@ pub(super) use soup::{Corner, NONE, Soup};
 
 use std::ops::Range;
 
-/// The largest number of a vertex, so that counts of corners, faces and normals can be added up.
+/// Largest number of a vertex, so that counts of corners, faces and normals can be added without overflow.
 pub(super) const LARGEST: u32 = u32::MAX / 4;
 
-/// What a file holds, before it has a place in a scene.
+/// Geometry of a file, before it is placed in a scene.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Geometry {
     pub soup: Soup,
-    /// The vertices of triangles, of a file that has no other faces and says nothing of their corners but what it says of
-    /// vertices, and no normals: most scans. [`Self::faces`] and what goes with them are empty then.
+    /// Vertices of triangles, for a file without other faces, without attributes of corners except those of
+    /// vertices, and without normals: most scans. [`Self::faces`] and the lists beside it are empty then.
     pub triangles: Vec<[u32; 3]>,
-    /// Where these stand in the file; empty where the line of each is its number.
+    /// Lines and numbers of the triangles in the file; empty where the line of each is its number.
     pub face_spans: Vec<FaceSpan>,
     pub faces: Vec<Face>,
     pub wire_statements: Vec<WireStatement>,
-    /// Whether every vertex is a point instead, which has the normal of the same number; coordinates do not count.
+    /// Whether every vertex is a point instead, with the normal of the same index; texture coordinates are ignored.
     pub is_cloud: bool,
     pub runs: Vec<Run>,
     /// Names; 0 is the empty one.
     pub names: Vec<String>,
-    /// What runs have their materials from: MTL files, or pictures, which these name; with the lines that name them.
+    /// Files that runs have their materials from: MTL files or pictures, with the lines that name them.
     pub sources: Vec<(u32, String)>,
     /// Decimal places of the finest coordinate.
     pub places: i32,
-    /// What the file says of itself: the first comments, without their signs.
+    /// The first comments of the file, without comment characters.
     pub comments: Vec<String>,
-    /// Faces that had fewer than 3 corners.
+    /// Number of faces with fewer than 3 corners.
     pub few_corners: u32,
 }
 
 /// One face, without its corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Face {
-    /// Which of [`Geometry::runs`].
+    /// Index into [`Geometry::runs`].
     pub run: u32,
     /// Smoothing group; 0: none.
     pub smoothing: u32,
     /// Number of corners, at least 3.
     pub arity: u32,
-    /// Where it starts in the file.
+    /// Line in the file.
     pub line: u32,
-    /// Which of the file's faces, from 0; those that are not kept count.
+    /// Index of the face in the file, counting dropped faces.
     pub number: u32,
-    /// The first of its corners in [`Soup::corners`].
+    /// Index of its first corner in [`Soup::corners`].
     pub first: u32,
 }
 
 impl Face {
-    /// Its corners in [`Soup::corners`].
+    /// Range of its corners in [`Soup::corners`].
     pub(super) fn corners(&self) -> Range<usize> {
         self.first as usize..self.first as usize + self.arity as usize
     }
 }
 
-/// Faces that follow each other line by line, with as many corners each, and all else that they share.
+/// Faces on consecutive lines, with equal numbers of corners and equal attributes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct FaceSpan {
-    /// The first of them.
+    /// The first face.
     pub face: Face,
     pub count: u32,
 }
 
 impl FaceSpan {
-    /// The `i`th of them; the one behind the last is what may be added.
+    /// The `i`th face; the one behind the last is the face that may extend the span.
     pub(super) fn face(&self, i: u32) -> Face {
         let Face { line, number, first, arity, .. } = self.face;
         let (line, number) = (line.saturating_add(i), number.saturating_add(i));
         Face { line, number, first: first.saturating_add(i.saturating_mul(arity)), ..self.face }
     }
 
-    /// All faces of some of them.
+    /// All faces of several spans.
     pub(super) fn all(some: &[Self]) -> Vec<Face> {
         let mut faces = Vec::with_capacity(some.iter().map(|span| span.count as usize).sum());
         some.iter().for_each(|span| faces.extend((0..span.count).map(|i| span.face(i))));
@@ -101,17 +101,17 @@ impl FaceSpan {
 /// One `p` or `l` statement, without its corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct WireStatement {
-    /// Which of [`Geometry::runs`].
+    /// Index into [`Geometry::runs`].
     pub run: u32,
-    /// Where it stands in the file.
+    /// Line in the file.
     pub line: u32,
-    /// Number of corners, at least 1, or 2 of a line.
+    /// Number of corners, at least 1, or 2 for a line.
     pub arity: u32,
     /// Whether its corners are joined.
     pub joined: bool,
 }
 
-/// What faces between two `o`, `g` or `usemtl` statements share; indices into [`Geometry::names`].
+/// State shared by faces between two `o`, `g` or `usemtl` statements; indices into [`Geometry::names`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Run {
     pub object: u32,
@@ -121,7 +121,7 @@ pub(super) struct Run {
 }
 
 impl Geometry {
-    /// Makes faces of the triangles.
+    /// Converts the triangles into faces.
     #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32 corners")]
     pub(super) fn spell_out(&mut self) {
         let triangles = std::mem::take(&mut self.triangles);

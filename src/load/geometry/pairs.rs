@@ -1,25 +1,25 @@
-//! Numbers pairs of (position, something) as they are met: how corners become vertices, mostly without hashing.
+//! Numbers pairs of (position, key) in the order met: turns corners into vertices, mostly without hashing.
 
 use std::collections::HashMap;
 use std::hash::Hash;
 
 /// A table from (position, key) to 0, 1, 2, …
 ///
-/// Keys of one position form a chain, short because few different corners meet in one place; where very many do, as at
-/// the pole of a fan, those that come later are hashed.
+/// Keys of one position form a chain, short because few different corners meet at one position; where very many do, as at
+/// the pole of a fan, the later ones are hashed.
 #[derive(Debug)]
 pub(super) struct Pairs<K> {
     /// First entry of each position's chain.
     head: Vec<u32>,
     /// Position, key, and the next entry of the chain.
     entries: Vec<(u32, K, u32)>,
-    /// The numbers of pairs whose positions had a chain of [`LONGEST`] before.
+    /// Numbers of the pairs whose positions had a full chain of [`LONGEST`] entries.
     hashed: HashMap<(u32, K), u32>,
 }
 
 const END: u32 = u32::MAX;
 
-/// Entries of a chain.
+/// Largest length of a chain.
 const LONGEST: usize = 64;
 
 impl<K: Copy + Eq + Hash> Pairs<K> {
@@ -28,7 +28,7 @@ impl<K: Copy + Eq + Hash> Pairs<K> {
         Self { head: vec![END; positions], entries: Vec::new(), hashed: HashMap::new() }
     }
 
-    /// The number of a pair; a new one gets the next number.
+    /// Number of a pair; a new pair gets the next number.
     pub(super) fn number(&mut self, position: u32, key: K) -> u32 {
         let mut at = self.head[position as usize];
         let mut length = 0;
@@ -53,17 +53,17 @@ impl<K: Copy + Eq + Hash> Pairs<K> {
         new
     }
 
-    /// Every pair, in the order of the numbers.
+    /// All pairs, in the order of their numbers.
     pub(super) fn iter(&self) -> impl Iterator<Item = (u32, K)> {
         self.entries.iter().map(|&(position, key, _)| (position, key))
     }
 
-    /// How many pairs there are.
+    /// Number of pairs.
     pub(super) fn len(&self) -> usize {
         self.entries.len()
     }
 
-    /// Forgets all pairs, in time proportional to their number.
+    /// Removes all pairs, in time proportional to their number.
     pub(super) fn clear(&mut self) {
         for (position, ..) in self.entries.drain(..) {
             self.head[position as usize] = END;

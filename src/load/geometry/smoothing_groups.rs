@@ -1,11 +1,11 @@
-//! Normals of smoothing groups, for faces that bring none.
+//! Normals of smoothing groups, for faces without normals.
 //!
 //! The normal of a corner is the sum of the normals of the faces that meet there in the same group, each weighted by
 //! its angle (G. Thürmer and C. A. Wüthrich, "Computing Vertex Normals from Polygonal Facets", 1998), so that it does
 //! not depend on how faces are cut.
 //!
 //! A face in no group is flat, and so is every face of a file that has neither normals nor groups, such as most scans:
-//! that is what the OBJ text says and what most viewers show.
+//! the OBJ specification says so and most viewers do so.
 
 use super::Face;
 use super::pairs::Pairs;
@@ -14,16 +14,16 @@ use crate::load::smooth_normals::angle;
 use crate::math::ear_clip::newell;
 use crate::math::{DVec3, Vec3};
 
-/// Normals of smoothing groups, and which one each corner uses.
+/// Normals of smoothing groups, and the one that each corner uses.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Smooth {
-    /// Unit length.
+    /// Unit normals.
     pub normals: Vec<Vec3>,
     /// Per corner of [`Soup::corners`]: index into `normals`, or [`NONE`]. Empty when no corner uses any.
     pub of_corner: Vec<u32>,
 }
 
-/// Computes what the corners without a normal need.
+/// Computes the normals of corners without one.
 pub(super) fn smooth(soup: &Soup, positions: &[Vec3], faces: &[Face]) -> Smooth {
     let needs = |f: &Face| f.smoothing > 0 && soup.corners[f.corners()].iter().any(|c| c.normal == NONE);
     if !faces.iter().any(needs) {
@@ -48,7 +48,7 @@ pub(super) fn smooth(soup: &Soup, positions: &[Vec3], faces: &[Face]) -> Smooth 
         }
     }
 
-    // A corner keeps the sum only where it is needed and not zero.
+    // A corner keeps the sum only where it has no normal of its own and the sum is not zero.
     let normals: Vec<Vec3> = sums.iter().map(|s| s.normalize_or_zero().as_vec3()).collect();
     for (corner, use_) in soup.corners.iter().zip(&mut of_corner) {
         if corner.normal != NONE || (*use_ != NONE && normals[*use_ as usize] == Vec3::ZERO) {

@@ -20,13 +20,13 @@ pub(in crate::load) struct Corner {
 /// The vertices of a file in its order, and the corners of all faces one after another.
 #[derive(Clone, Debug, Default)]
 pub(in crate::load) struct Soup {
-    /// Those that no face, line or point uses are not finite.
+    /// Positions; those that no face, line or point uses are not finite.
     pub positions: Vec<DVec3>,
-    /// v points up, as in the file. Those that corners name are finite.
+    /// Texture coordinates, v upwards as in the file; finite where corners name them.
     pub uvs: Vec<DVec2>,
-    /// Unit length where corners name them.
+    /// Normals, of unit length where corners name them.
     pub normals: Vec<Vec3>,
-    /// Per position; as written until [`super::color::settle`] has looked at them, 0…1 then. Empty when the file has none.
+    /// Colour per position; as written before [`super::color::settle`], 0…1 afterwards. Empty when the file has none.
     pub colors: Vec<[f32; 3]>,
     /// Opacity per position, 0…1; empty when everything is opaque.
     pub alphas: Vec<f32>,
@@ -36,10 +36,10 @@ pub(in crate::load) struct Soup {
 }
 
 impl Soup {
-    /// Takes the places of vertices that nothing uses, neither corners nor `triangles`, so that they move neither the centre
-    /// nor the frame.
+    /// Removes the positions of vertices that neither corners nor `triangles` use, so that they affect neither the centre
+    /// nor the framing.
     pub(in crate::load) fn leave_out_unused(&mut self, triangles: &[[u32; 3]]) {
-        /// Corners and positions that one thread looks at at a time.
+        /// Number of corners or positions per parallel task.
         const MANY: usize = 1 << 13;
         let used: Vec<AtomicBool> = std::iter::repeat_with(AtomicBool::default).take(self.positions.len()).collect();
         let of_corners = self.corners.par_iter().chain(&self.wire_corners).map(|corner| corner.position);

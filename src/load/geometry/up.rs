@@ -1,6 +1,6 @@
-//! Which axis points up: OBJ does not say, nor do PLY and STL.
+//! Guesses the up axis: OBJ does not specify it, nor do PLY and STL.
 //!
-//! Where nothing speaks for an axis the kind of file decides: an OBJ is +Y. There +Z is chosen only on evidence: a comment
+//! Without evidence the kind of file decides: an OBJ is +Y. There +Z is chosen only on evidence: a comment
 //! that says so, a comment of a program known to write +Z, coordinates of a map, or a model that stands on z = 0 with a
 //! flat bottom there, reaches to both sides of y = 0, and is not a thin plate (which may as well lean against a wall).
 
@@ -27,11 +27,11 @@ const Z_WRITERS: [&str; 14] = [
     "ifcopenshell",
 ];
 
-/// The up axis of an OBJ that gives no sign.
+/// Default up axis of an OBJ.
 pub(in crate::load) const UNSAID: (UpAxis, &str) = (UpAxis::Y, "OBJ does not say, and nothing speaks for +Z");
 
 /// Guesses from the comments, then from the shape of meshes around the centre of all vertices, or else takes
-/// `otherwise`; the text says why.
+/// `otherwise`; the text is the reason.
 pub(in crate::load) fn guess(
     comments: &[String],
     meshes: &[Mesh],
@@ -56,7 +56,7 @@ pub(in crate::load) fn guess(
     (otherwise.0, otherwise.1.into())
 }
 
-/// The axis that a comment says points up, in whole words: `z-up`, `Y_UP`, `Up Axis: Z`, `zup`, but not `copy_updated`.
+/// Up axis that a comment states, in whole words: `z-up`, `Y_UP`, `Up Axis: Z`, `zup`, but not `copy_updated`.
 fn said(comment: &str) -> Option<UpAxis> {
     let text = comment.to_lowercase();
     let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
@@ -74,10 +74,10 @@ fn said(comment: &str) -> Option<UpAxis> {
     [(UpAxis::Z, "z"), (UpAxis::Y, "y")].into_iter().find_map(|(axis, name)| says(name).then_some(axis))
 }
 
-/// Whether x and y of most vertices are as far from 0 as metres are on maps, and z is not: grids of whole countries begin
-/// outside of them.
+/// Whether x and y of most vertices are as large as metres on maps, and z is not: the origin of a national grid lies
+/// outside of its country.
 fn lies_on_a_map(placed: &Placed) -> bool {
-    /// Metres from the beginning of a grid; and heights on Earth.
+    /// Least distance from the origin of a grid, and greatest height on Earth, in metres.
     const FAR: f64 = 1e5;
     const HIGH: f64 = 1e4;
     let place = |i: usize| placed.positions[i].as_dvec3() + placed.center;
@@ -86,11 +86,11 @@ fn lies_on_a_map(placed: &Placed) -> bool {
         .is_some_and(|(lo, hi)| is_far(lo.x, hi.x) && is_far(lo.y, hi.y) && -HIGH < lo.z && hi.z < HIGH)
 }
 
-/// Whether the shape is that of something standing on z = 0 and not on, or behind, y = 0.
+/// Whether the shape stands on z = 0 and not on, or behind, y = 0.
 fn stands_on_z(meshes: &[Mesh], center: DVec3) -> bool {
-    /// Relative size of what counts as touching.
+    /// Tolerance of touching, relative to the size.
     const TOUCH: f64 = 1e-4;
-    /// A bottom has at least this share of the whole surface.
+    /// Smallest share of a bottom in the whole surface.
     const BOTTOM: f64 = 0.02;
     let points = meshes.iter().flat_map(|m| &m.positions).map(|p| p.as_dvec3() + center);
     let (lo, hi) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
@@ -139,12 +139,12 @@ mod tests {
         let at = |x: f64, y: f64, z: f64| {
             let mut positions = vec![Vec3::ZERO, Vec3::new(600.0, 600.0, 80.0), Vec3::new(20.0, 7.0, 30.0)];
             positions.resize(9, Vec3::ONE);
-            // A vertex that was left at 0.
+            // A stray vertex at 0.
             positions.push(-DVec3::new(x, y, z).as_vec3());
             guess(&[], &[], &Placed { center: DVec3::new(x, y, z), positions, ..Placed::default() }, UNSAID).0
         };
         assert_eq!([at(432_100.0, 5_411_222.0, 302.0), at(-3.2e5, -1.1e6, 0.0)], [UpAxis::Z; 2]);
-        // Heights along y, and things that just stand far away.
+        // Heights along y, and objects that are merely far away.
         assert_eq!([at(432_100.0, 302.0, 5_411_222.0), at(1e5, 1e5, 1e5), at(0.0, 0.0, 0.0)], [UpAxis::Y; 3]);
         assert_eq!(guess(&[], &[], &Placed::default(), UNSAID).0, UpAxis::Y, "nothing is nowhere");
     }

@@ -1,4 +1,4 @@
-//! Points and lines -> what `load::wires` draws: one part for each run of geometry that share object, group and material.
+//! Points and lines -> input of `load::wires`: one part for each run of geometry that shares object, group and material.
 
 use super::assemble::{Key, colors, fill_vertices, name};
 use super::pairs::Pairs;
@@ -11,7 +11,7 @@ use crate::scene::Mesh;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// The points and lines of each of [`Geometry::runs`] that has any, with its index.
+/// Points and lines of each of [`Geometry::runs`] that has any, with the index of the run.
 pub(super) fn assemble(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Vec<(u32, Wires)> {
     if geometry.is_cloud && !soup.positions.is_empty() {
         return vec![(0, cloud(geometry, soup, placed))];
@@ -36,7 +36,7 @@ pub(super) fn assemble(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Vec
     of_run.into_iter().map(&mut build).collect()
 }
 
-/// All vertices as points.
+/// Makes all vertices points.
 fn cloud(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Wires {
     let positions = placed.positions.clone();
     let normals = if soup.normals.len() == positions.len() { normals(soup.normals.clone()) } else { Vec::new() };
@@ -46,7 +46,7 @@ fn cloud(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Wires {
     Wires { mesh: Mesh { name: name(geometry, 0), positions, normals, colors, ..Mesh::default() }, ends }
 }
 
-/// The normals of points, where most have one: the others, of which scanners leave some, look where these do in the mean.
+/// Normals of points, where most have one; the others, left out by some scanners, get the mean. Empty otherwise.
 fn normals(mut normals: Vec<Vec3>) -> Vec<Vec3> {
     let said = || normals.iter().filter(|normal| **normal != Vec3::ZERO);
     let count = said().count();
@@ -79,7 +79,7 @@ fn wires(
     }
     let mut mesh = Mesh::default();
     fill_vertices(&mut mesh, vertices, soup, &placed.positions);
-    // Lit only where every end says how.
+    // Lit only where every end has a normal.
     if vertices.iter().all(|(_, (_, normal))| normal != NONE) {
         let normal = |(_, (_, normal)): (u32, Key)| soup.normals.get(normal as usize).copied().unwrap_or(Vec3::Z);
         mesh.normals = vertices.iter().map(normal).collect();

@@ -1,4 +1,4 @@
-//! What a scene file says, and the files that it names -> the scene.
+//! Parsed scene file and the files that it names -> the scene.
 
 use super::reader::Faults;
 use super::{FORMAT, Model, Parsed, Surrounding, shapes};
@@ -13,7 +13,7 @@ use crate::stopwatch::Stopwatch;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Reads the models and puts everything together.
+/// Reads the models and assembles the scene.
 pub(super) fn assemble(
     parsed: Parsed,
     faults: &Faults,
@@ -42,7 +42,7 @@ pub(super) fn assemble(
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }
 
-/// Looks for all files that are named, before any is read, so that all that are not there are told at once.
+/// Locates all named files before any is read, so that all missing ones are reported at once.
 fn check_files(
     models: &[Model],
     panorama: Option<&Surrounding>,
@@ -69,11 +69,11 @@ struct Assembly<'a> {
     scene: Scene,
     facts: Facts,
     warnings: Warnings,
-    /// What several models show is read and stored once: by its file, its up axis and its material.
+    /// Models by file, up axis and material: one that occurs again is read and stored once.
     known: HashMap<(String, Option<UpAxis>, Option<u32>), Known>,
 }
 
-/// A model that was read.
+/// A model that was read, for further placements.
 struct Known {
     places: Scene,
     stored: Stored,
@@ -81,11 +81,11 @@ struct Known {
 }
 
 impl Assembly<'_> {
-    /// Reads the picture of what surrounds the scene.
+    /// Reads the picture that surrounds the scene.
     fn set_environment(&mut self, Surrounding { file, at, rotation }: Surrounding) -> Result<(), LoadError> {
         let path = &self.source.path;
         let over = |over| Diagnostic::over_budget(path, over);
-        // The file itself is needed no longer than until it is decoded.
+        // The file's bytes are freed once it is decoded, so they are taken from a copy of the budget.
         let bytes = self
             .resolver
             .read_file_within(Path::new(&file), &mut self.budget.clone())
@@ -100,7 +100,7 @@ impl Assembly<'_> {
         Ok(())
     }
 
-    /// Adds a model; one that was added before is only placed once more.
+    /// Adds a model; one that was added before is only placed again.
     fn add(&mut self, model: &Model) -> Result<(), LoadError> {
         let scene = &self.scene;
         let before = [scene.meshes.len(), scene.spheres.len(), scene.cones.len(), scene.planes.len()];
@@ -113,7 +113,7 @@ impl Assembly<'_> {
             }
             None => self.add_first(model)?,
         };
-        // Shapes count on from this scene's materials once they are appended, so an override comes after.
+        // Appending renumbers the materials of shapes, so the override comes afterwards.
         if let Some(material) = model.material {
             self.make_of(material, before);
         }
@@ -125,7 +125,7 @@ impl Assembly<'_> {
 
     /// Reads a model and adds it.
     fn add_first(&mut self, model: &Model) -> Result<Known, LoadError> {
-        // What is needed only while a model is read is free for the next one.
+        // Temporary memory of reading is free again for the next model.
         let mut own = *self.budget;
         let Loaded { scene, warnings, facts } = self.read(model, &mut own)?;
         self.facts.add_animations(&facts);
@@ -138,7 +138,7 @@ impl Assembly<'_> {
         Ok(Known { places, stored, facts })
     }
 
-    /// Takes so many bytes for a model.
+    /// Takes `bytes` bytes for a model.
     fn take(&mut self, bytes: u64, model: &Model) -> Result<(), Diagnostic> {
         self.budget.take(bytes, 1).map_err(|over| {
             let fault = Diagnostic::over_budget(&self.source.path, over);
@@ -146,7 +146,7 @@ impl Assembly<'_> {
         })
     }
 
-    /// Makes all shapes from these numbers of meshes, spheres, cones and planes on of one material.
+    /// Sets the material of all shapes from these indices of meshes, spheres, cones and planes on.
     fn make_of(&mut self, material: u32, [meshes, spheres, cones, planes]: [usize; 4]) {
         self.scene.meshes[meshes..].iter_mut().for_each(|mesh| mesh.material = material);
         self.scene.spheres[spheres..].iter_mut().for_each(|sphere| sphere.material = material);
@@ -170,26 +170,26 @@ impl Assembly<'_> {
         let watch = Stopwatch::of_this_thread();
         let model_source = resolver.read_model(&path)?;
         let reading = watch.read();
-        // Asked before it is read, or a file that names itself would never end.
+        // Checked before the file is loaded: one that names itself would recurse for ever.
         if matches!(detect::detect(&model_source)?, detect::Format::SceneFile) {
             let text = format!("`{}` is a scene file, and scene files do not nest", model.file);
             return Err(Diagnostic::new("scene-nested", &source.path, place(), text).remedy("name a model").into());
         }
         let mut loaded = crate::load::load_within(&model_source, &options, budget)?;
         loaded.facts.reading += reading;
-        // Which model an archive stands for is known when that is looked into.
+        // A model inside an archive is known only once the archive is opened, so the path counts as a gap.
         loaded.facts.gaps |= model_source.path != path;
-        // It was read where it really lies; a copy of the whole would still name that.
+        // Files are listed by their real paths; translate them to paths as named, which stay valid in a copy of the folders.
         let named = resolver.as_named(Path::new(&model.file));
-        // What lies beside a model that is named by a link does not lie beside the link.
+        // Files beside the target of a link do not lie beside the link.
         let beside = named.parent().filter(|_| resolver.lies_beside(&named, &path));
         loaded.facts.files.iter_mut().for_each(|file| file.path = as_named(&file.path, &path, (&named, beside)));
         Ok(loaded)
     }
 }
 
-/// The path of a file that was read for a model with this path, which was `named` so: from there, if it is the model or in it,
-/// which is an archive then, or from the folder `beside`, if it lies in that of the model.
+/// Path, as named, of a `file` read for the model at path `model`, which was named `named`: relative to `named` if the file is
+/// the model or inside it (an archive), or relative to the folder `beside` if it lies in the model's folder.
 fn as_named(file: &Path, model: &Path, (named, beside): (&Path, Option<&Path>)) -> PathBuf {
     let way = file.strip_prefix(model);
     if let Ok(way) = way {
@@ -199,13 +199,13 @@ fn as_named(file: &Path, model: &Path, (named, beside): (&Path, Option<&Path>)) 
     way.zip(beside).map_or_else(|| file.into(), |(way, beside)| beside.join(way))
 }
 
-/// Adds what was found out about a model that is shown once more, stretched so much.
+/// Adds the facts of a placed model; `stretch` is the factor of its placement.
 fn tell(facts: &mut Facts, found: &Facts, stretch: f64) {
     facts.faces += found.faces;
     facts.dropped.extend_from_slice(&found.dropped);
     facts.wires.append(&found.wires);
     facts.extensions.extend_from_slice(&found.extensions);
-    // A scene file has none of its own; those of its first model that has any are told.
+    // A scene file has none of its own; it takes those of its first model that has any.
     if facts.scenes.is_empty() {
         (facts.scenes, facts.scene_index) = (found.scenes.clone(), found.scene_index);
     }

@@ -11,7 +11,7 @@ enum Model {
     Unlit,
 }
 
-/// Keys that only the model `pbr` has: meeting one where there is no `model` means that it was forgotten.
+/// Keys of the model `pbr` alone: meeting one without `model` means that `model` was forgotten.
 const PBR_KEYS: [&str; 4] = ["base_color", "metallic", "roughness", "thick"];
 
 /// Reads one material.

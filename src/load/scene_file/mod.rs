@@ -1,7 +1,7 @@
 //! Scene files (`.toml`): models, inline shapes, materials, lights and cameras, written by hand.
 //!
-//! As much as published ray tracing scenes and our own `models/` need, and no more. Unknown keys are errors that name
-//! the nearest known one; every error says line and column, and all of them are reported at once.
+//! Supports what published ray tracing scenes and our own `models/` need, and no more. Unknown keys are errors that name
+//! the nearest known one; every error has line and column, and all of them are reported at once.
 //!
 //! # Schema
 //! Lengths are in the unit of the scene (metres when nothing else is said), angles in degrees. A *colour* is
@@ -158,10 +158,10 @@ use toml::de::{DeTable, DeValue};
 
 const UP: [(&str, UpAxis); 2] = [("y", UpAxis::Y), ("z", UpAxis::Z)];
 
-/// Loads a scene file and the models it names; whatever that takes comes out of `budget`.
+/// Loads a scene file and the models it names; its memory is taken from `budget`.
 ///
 /// # Errors
-/// Every fault of the file with its line and column, or those of a model; or when it would take more than is left.
+/// Every fault of the file with its line and column, or those of a model; or when memory would exceed the budget.
 pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
     let text = match std::str::from_utf8(&source.bytes) {
         Ok(text) => text.strip_prefix('\u{feff}').unwrap_or(text).to_owned(),
@@ -178,7 +178,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
 
 /// Reads the text.
 fn read(faults: &Faults, options: &LoadOptions) -> Result<Parsed, LoadError> {
-    /// Texts up to this size are read to their end for all faults of their syntax, each of which takes memory.
+    /// Largest text that is parsed to its end for all faults of syntax, in bytes; each fault takes memory.
     const SMALL: usize = 1 << 20;
     let root = match DeTable::parse(faults.text()) {
         Ok(root) => root,
@@ -199,20 +199,20 @@ fn read(faults: &Faults, options: &LoadOptions) -> Result<Parsed, LoadError> {
     Ok(parsed)
 }
 
-/// What the text says, before any model is read.
+/// Contents of the text, before any model is read.
 struct Parsed {
     scene: Scene,
     models: Vec<Model>,
     panorama: Option<Surrounding>,
     lost: Lost,
-    /// The largest displacement of a vertex by rounding to `f32`, world units.
+    /// Largest displacement of a vertex by rounding to `f32`, world units.
     max_rounding: f64,
 }
 
 /// A picture around the scene.
 struct Surrounding {
     file: String,
-    /// The byte at which it is named.
+    /// Byte offset of its name.
     at: usize,
     rotation: f32,
 }
@@ -220,7 +220,7 @@ struct Surrounding {
 /// One `[[models]]` entry.
 struct Model {
     file: String,
-    /// The byte at which it is named.
+    /// Byte offset of its name.
     at: usize,
     up: Option<UpAxis>,
     material: Option<u32>,
@@ -267,7 +267,7 @@ fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -
     Parsed { scene, models, panorama, lost, max_rounding }
 }
 
-/// Adds all shapes that the file has itself; the largest displacement of a vertex by rounding.
+/// Adds the file's own shapes; returns the largest displacement of a vertex by rounding.
 fn add_shapes(root: &Table, scene: &mut Scene, names: &mut Names, lost: &mut Lost) -> f64 {
     let mut inline = Vec::new();
     for table in root.tables("meshes", "mesh") {
@@ -304,14 +304,14 @@ fn model(scene: &mut Scene, names: &mut Names, table: Table) -> Option<Model> {
     Some(Model { file: file?, at, up, material, world_from_model })
 }
 
-/// Materials by name, and the plain one once a shape has it.
+/// Indices of materials by name, and of the plain one once a shape uses it.
 struct Names {
     of: HashMap<String, u32>,
     plain: Option<u32>,
 }
 
 impl Names {
-    /// The index of the material a shape names; one that names none gets the plain one.
+    /// Index of the material that a shape names, or of the plain one.
     fn material(&mut self, scene: &mut Scene, table: &Table) -> u32 {
         let is_listed = table.faults.lists(table.place_of("material").start);
         let named = table.get("material", |value| {
@@ -347,7 +347,7 @@ fn background(value: &DeValue) -> Result<Background, String> {
     }
 }
 
-/// The picture that `environment` names, if it names a file.
+/// Reads the picture of `environment`, if it names a file.
 fn surrounding(root: &Table) -> Option<Surrounding> {
     let named = |value: &DeValue| Ok(value.as_str().filter(|name| is_picture(name)).map(str::to_owned));
     let file = root.get("environment", named).flatten();
@@ -380,7 +380,7 @@ fn environment(value: &DeValue) -> Result<Environment, String> {
     }
 }
 
-/// What [`super::Facts::format`] says of scene files.
+/// [`super::Facts::format`] of scene files.
 pub const FORMAT: &str = "meshray scene";
 
 #[expect(clippy::cast_possible_truncation, reason = "a scene file is far smaller than 2^32 lines")]

@@ -1,5 +1,5 @@
-//! Tables of a scene file, read key by key: every fault is noted with its line and column, unknown keys with the
-//! nearest known one, and reading goes on so that all faults are told at once; of very many, the first ones.
+//! Reads tables of a scene file key by key: every fault is noted with its line and column, unknown keys with the
+//! nearest known one, and reading continues so that all faults are reported at once; of very many, the first ones.
 //!
 //! Knows TOML, not scenes.
 
@@ -13,21 +13,21 @@ use std::path::PathBuf;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Bytes of the file.
+/// Byte range in the file.
 pub(super) type Span = Range<usize>;
 
-/// Faults that are listed; the others are only counted.
+/// Largest number of faults that are listed; the others are only counted.
 const SHOWN: usize = 20;
 
-/// The file and what is wrong with it.
+/// The text of the file and its faults.
 pub(super) struct Faults {
     file: PathBuf,
     text: String,
-    /// Where each line starts; made when somebody asks.
+    /// Start of each line; computed on first use.
     lines: OnceCell<Vec<usize>>,
-    /// Those that are listed, each with the byte it is at, and a few more.
+    /// Faults to list, each with its byte offset, and a few more.
     list: RefCell<Vec<(usize, Diagnostic)>>,
-    /// How many are not in the list.
+    /// Number of faults that are not in the list.
     hidden: Cell<u32>,
 }
 
@@ -60,10 +60,10 @@ impl Faults {
         }
     }
 
-    /// Notes that a file is named at this byte that cannot be read.
+    /// Notes that the file named at this byte cannot be read.
     pub(super) fn note_file(&self, at: usize, fault: &FileFault) {
         let Diagnostic { code, text, mut remedy, .. } = fault.diagnose(&self.file, "");
-        // What else names files is a model.
+        // The diagnostic is worded for models; adapt it.
         let text = text.replace("outside the model's folder", "outside the scene file's folder");
         if fault.is_missing() {
             remedy = remedy.replace("the model", "the scene file");
@@ -71,7 +71,7 @@ impl Faults {
         self.note(code, &(at..at), text, remedy);
     }
 
-    /// Whether a fault at this byte would be listed; one that is not costs no thought about what may have been meant.
+    /// Whether a fault at this byte would be listed; if not, no suggestion needs to be searched.
     pub(super) fn lists(&self, at: usize) -> bool {
         self.list.borrow().iter().filter(|(start, _)| *start <= at).count() < SHOWN
     }
@@ -81,7 +81,7 @@ impl Faults {
         self.hidden.set(self.hidden.get().saturating_add(1));
     }
 
-    /// Keeps the first ones, in the order of the file.
+    /// Drops all but the first faults, in the order of the file.
     fn shorten(&self, list: &mut Vec<(usize, Diagnostic)>) {
         list.sort_by_key(|(start, _)| *start);
         for _ in list.drain(SHOWN.min(list.len())..) {
@@ -89,12 +89,12 @@ impl Faults {
         }
     }
 
-    /// Stops here when there are faults.
+    /// Returns an error when there are faults.
     pub(super) fn check(&self) -> Result<(), LoadError> {
         if self.list.borrow().is_empty() { Ok(()) } else { Err(self.all()) }
     }
 
-    /// All faults, of which there are some, in the order of the file.
+    /// All faults, at least one, in the order of the file.
     pub(super) fn all(&self) -> LoadError {
         let mut list = self.list.take();
         self.shorten(&mut list);
@@ -108,12 +108,12 @@ impl Faults {
     }
 }
 
-/// One table; [`Table::finish`] complains about the keys nobody asked for.
+/// One table; [`Table::finish`] reports the keys that were never read.
 pub(super) struct Table<'a> {
     pub(super) faults: &'a Faults,
-    /// What it describes, for messages: `light`, `material`.
+    /// Name of the described object, for messages: `light`, `material`.
     what: &'static str,
-    /// Where it begins.
+    /// Position of the table.
     pub(super) span: Span,
     map: &'a DeTable<'a>,
     asked: RefCell<Vec<&'static str>>,
@@ -129,17 +129,17 @@ impl<'a> Table<'a> {
         self.map.iter().find(|(k, _)| k.get_ref() == key).map(|(_, value)| value)
     }
 
-    /// Whether a key is there, whatever its value.
+    /// Whether the key exists, whatever its value.
     pub(super) fn has(&self, key: &'static str) -> bool {
         self.find(key).is_some()
     }
 
-    /// Where a key's value stands, or else the table.
+    /// Position of a key's value, or else of the table.
     pub(super) fn place_of(&self, key: &'static str) -> Span {
         self.find(key).map_or(self.span.clone(), Spanned::span)
     }
 
-    /// The value of a key; `None` when it is absent or wrong (the fault is noted).
+    /// Value of a key; `None` when it is absent or wrong (the fault is noted).
     pub(super) fn get<T>(&self, key: &'static str, read: impl FnOnce(&DeValue<'a>) -> Result<T, String>) -> Option<T> {
         let value = self.find(key)?;
         match read(value.get_ref()) {
@@ -151,7 +151,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// As [`Table::get`], and the key must be there.
+    /// As [`Table::get`], for a key that must exist.
     pub(super) fn need<T>(&self, key: &'static str, read: impl FnOnce(&DeValue<'a>) -> Result<T, String>) -> Option<T> {
         if !self.has(key) {
             self.note(&self.span, format!("this {} has no `{key}`", self.what), "add it");
@@ -160,7 +160,7 @@ impl<'a> Table<'a> {
         self.get(key, read)
     }
 
-    /// The tables of an array of tables.
+    /// Tables of an array of tables.
     pub(super) fn tables(&self, key: &'static str, what: &'static str) -> Vec<Table<'a>> {
         let Some(value) = self.find(key) else { return Vec::new() };
         let items: Option<Vec<_>> = match value.get_ref() {
@@ -174,7 +174,7 @@ impl<'a> Table<'a> {
         items.into_iter().map(|(span, map)| Table::new(self.faults, what, span, map)).collect()
     }
 
-    /// A table under a key.
+    /// Table under a key.
     pub(super) fn table(&self, key: &'static str, what: &'static str) -> Option<Table<'a>> {
         let value = self.find(key)?;
         let Some(map) = value.get_ref().as_table() else {
@@ -184,7 +184,7 @@ impl<'a> Table<'a> {
         Some(Table::new(self.faults, what, value.span(), map))
     }
 
-    /// All entries, each a table with a name of the user's: in the order of the file.
+    /// All entries, each a table with a user-defined name, in the order of the file.
     pub(super) fn named(&self, what: &'static str) -> Vec<(String, Table<'a>)> {
         let mut entries: Vec<_> = self.map.iter().collect();
         entries.sort_by_key(|(key, _)| key.span().start);
@@ -205,12 +205,12 @@ impl<'a> Table<'a> {
         tables
     }
 
-    /// Notes a fault that has to do with several keys.
+    /// Notes a fault that involves several keys.
     pub(super) fn note(&self, at: &Span, text: impl Into<String>, remedy: impl Into<String>) {
         self.faults.note("scene-value", at, text, remedy);
     }
 
-    /// Notes every key that was never asked for.
+    /// Notes every key that was never read.
     pub(super) fn finish(self) {
         let asked = self.asked.into_inner();
         for key in self.map.keys().filter(|key| !asked.contains(&key.get_ref().as_ref())) {
@@ -254,7 +254,7 @@ pub(super) fn number(value: &DeValue) -> Result<f64, String> {
     }
 }
 
-/// A number in `low..=high`.
+/// Reads a number in `low..=high`.
 pub(super) fn within(low: f64, high: f64) -> impl Fn(&DeValue) -> Result<f64, String> {
     move |value| {
         let n = number(value)?;
@@ -268,19 +268,19 @@ pub(super) fn within32(low: f32, high: f32) -> impl Fn(&DeValue) -> Result<f32, 
     move |value| within(f64::from(low), f64::from(high))(value).map(|n| n as f32)
 }
 
-/// A finite number above 0.
+/// Reads a finite number above 0.
 pub(super) fn positive(value: &DeValue) -> Result<f64, String> {
     let n = number(value)?;
     if n > 0.0 { Ok(n) } else { Err(format!("is {n}, but must be above 0")) }
 }
 
-/// A finite number, 0 or above.
+/// Reads a finite number, 0 or above.
 pub(super) fn not_negative(value: &DeValue) -> Result<f64, String> {
     let n = number(value)?;
     if n >= 0.0 { Ok(n) } else { Err(format!("is {n}, but must not be below 0")) }
 }
 
-/// A whole number in a range.
+/// Reads an integer in a range.
 pub(super) fn whole(low: u32, high: u32) -> impl Fn(&DeValue) -> Result<u32, String> {
     move |value| {
         let DeValue::Integer(i) = value else { return expected("a whole number", value) };
@@ -297,7 +297,7 @@ pub(super) fn string(value: &DeValue) -> Result<String, String> {
     value.as_str().map_or_else(|| expected("a string", value), |s| Ok(s.to_owned()))
 }
 
-/// One of some words; the error names the nearest.
+/// Reads one of several words; the error names the nearest.
 pub(super) fn word<T: Copy>(words: &[(&'static str, T)]) -> impl Fn(&DeValue) -> Result<T, String> {
     move |value| {
         let typed = string(value)?;
@@ -317,7 +317,7 @@ fn items<'v>(value: &'v DeValue, what: &str) -> Result<Vec<&'v DeValue<'v>>, Str
     Ok(array.iter().map(Spanned::get_ref).collect())
 }
 
-/// Every item of an array.
+/// Reads every item of an array.
 pub(super) fn each<T>(read: impl Fn(&DeValue) -> Result<T, String>) -> impl Fn(&DeValue) -> Result<Vec<T>, String> {
     move |value| {
         let read_item = |(i, item): (usize, &DeValue)| read(item).map_err(|wrong| format!("item {i} {wrong}"));
@@ -325,7 +325,7 @@ pub(super) fn each<T>(read: impl Fn(&DeValue) -> Result<T, String>) -> impl Fn(&
     }
 }
 
-/// Exactly `N` numbers.
+/// Reads exactly `N` numbers.
 pub(super) fn numbers<const N: usize>(value: &DeValue) -> Result<[f64; N], String> {
     let list = items(value, &format!("a list of {N} numbers"))?;
     let list: Vec<f64> = list.into_iter().map(number).collect::<Result<_, _>>()?;
@@ -337,12 +337,12 @@ pub(super) fn vec(value: &DeValue) -> Result<DVec3, String> {
     numbers::<3>(value).map(DVec3::from)
 }
 
-/// A vector of length 1.
+/// Reads a vector and normalizes it.
 pub(super) fn direction(value: &DeValue) -> Result<DVec3, String> {
     vec(value)?.try_normalize().ok_or_else(|| "must have a length".into())
 }
 
-/// A linear colour from `[r, g, b]`, a grey, `"#rrggbb"` or a name.
+/// Reads a linear colour from `[r, g, b]`, a grey, `"#rrggbb"` or a name.
 pub(super) fn color(value: &DeValue) -> Result<Vec3, String> {
     let rgb = match value {
         DeValue::String(text) => return crate::scene::color::parse(text).map_err(|wrong| format!("is wrong: {wrong}")),
@@ -356,7 +356,7 @@ pub(super) fn color(value: &DeValue) -> Result<Vec3, String> {
     Ok(rgb.as_vec3())
 }
 
-/// An index of refraction: a number, or the name of a substance.
+/// Reads an index of refraction: a number, or the name of a substance.
 pub(super) fn ior(value: &DeValue) -> Result<f64, String> {
     use crate::scene::ior::{TABLE, by_name};
     let Some(name) = value.as_str() else { return within(1.0, 100.0)(value) };

@@ -11,24 +11,24 @@ use std::collections::HashMap;
 use std::path::Path;
 use toml::de::DeValue;
 
-/// What could not be drawn: how many, and the byte at which the first stands.
+/// Counts of shapes that could not be drawn, each with the byte offset of the first.
 #[derive(Default)]
 pub(super) struct Lost {
     /// Shapes and faces with a coordinate or size that counts as infinite.
     far: (u64, usize),
-    /// Triangles that rounding has collapsed.
+    /// Triangles that collapsed by rounding.
     collapsed: (u64, usize),
 }
 
 impl Lost {
-    /// Tells of what was lost in the facts and as warnings.
+    /// Reports the counts in the facts and as warnings.
     pub(super) fn tell(self, faults: &Faults, file: &Path, facts: &mut Facts, warnings: &mut Warnings) {
         for (why, (count, at)) in [(&LeftOut::TOO_FAR, self.far), (&LeftOut::COLLAPSED, self.collapsed)] {
             why.tell(count, (file, faults.place(at)), &mut facts.dropped, warnings);
         }
     }
 
-    /// Whether a shape can be drawn by its places and sizes; counted if not.
+    /// Whether positions and sizes of a shape are usable; counts the shape if not.
     fn is_drawn(&mut self, places: &[DVec3], at: usize) -> bool {
         let drawn = places.iter().copied().all(is_usable);
         if !drawn {
@@ -50,7 +50,7 @@ pub(super) struct Inline {
     mesh: Mesh,
     positions: Vec<DVec3>,
     world_from_object: DAffine3,
-    /// The byte at which it stands.
+    /// Byte offset of its table.
     at: usize,
 }
 
@@ -70,7 +70,7 @@ pub(super) fn mesh(table: Table, material: u32, lost: &mut Lost) -> Option<Inlin
     let mut mesh = Mesh { name, material, ..Mesh::default() };
     let mut clipper = EarClipper::default();
     for (face, corners) in faces.iter().enumerate() {
-        // None when a corner is out of range, a fault that is noted elsewhere.
+        // `None` when a corner is out of range, a fault that is noted elsewhere.
         let points: Option<Vec<DVec3>> = corners.iter().map(|&c| positions.get(c as usize).copied()).collect();
         let points = points.unwrap_or_default();
         if !lost.is_drawn(&points, at) {
@@ -86,7 +86,7 @@ pub(super) fn mesh(table: Table, material: u32, lost: &mut Lost) -> Option<Inlin
     Some(Inline { mesh, positions, world_from_object, at })
 }
 
-/// The positions that triangles use, in the order of the file; numbers these anew.
+/// Positions that triangles use, in the order of the file; renumbers the corners of the triangles.
 fn used(mesh: &mut Mesh, positions: Vec<DVec3>) -> Vec<DVec3> {
     let mut is_used = vec![false; positions.len()];
     mesh.triangles.iter().flatten().for_each(|&corner| is_used[corner as usize] = true);
@@ -99,9 +99,9 @@ fn used(mesh: &mut Mesh, positions: Vec<DVec3>) -> Vec<DVec3> {
     positions.into_iter().zip(is_used).filter(|(_, used)| *used).map(|(position, _)| position).collect()
 }
 
-/// Rounds the coordinates of inline meshes and puts them into the scene; the largest displacement by that, world units.
+/// Rounds the coordinates of inline meshes and adds them to the scene; returns the largest displacement, world units.
 ///
-/// Those that are placed alike have one centre, so that what touches is still seen to stand together.
+/// Meshes with the same placement share a centre, so that touching ones are recognized as standing together.
 pub(super) fn place(inline: Vec<Inline>, scene: &mut Scene, lost: &mut Lost) -> f64 {
     let key = |place: &DAffine3| place.to_cols_array().map(f64::to_bits);
     let mut boxes: HashMap<[u64; 12], (DVec3, DVec3)> = HashMap::new();
@@ -130,7 +130,7 @@ pub(super) fn place(inline: Vec<Inline>, scene: &mut Scene, lost: &mut Lost) -> 
     max_rounding
 }
 
-/// How much longer a transform makes a line, at most: exact where its axes stay perpendicular.
+/// Largest factor by which a transform stretches a line: exact where its axes stay perpendicular, an underestimate elsewhere.
 pub(super) fn stretch(transform: &DAffine3) -> f64 {
     let DMat3 { x_axis, y_axis, z_axis } = transform.matrix3;
     x_axis.length().max(y_axis.length()).max(z_axis.length())
@@ -199,7 +199,7 @@ fn drawn(cone: Cone, at: usize, lost: &mut Lost) -> Option<Cone> {
     lost.is_drawn(&[cone.base, cone.apex, radii], at).then_some(cone)
 }
 
-/// The two ends of an axis; they must differ.
+/// Reads the two ends of an axis, which must differ.
 fn ends(table: &Table, first: &'static str, second: &'static str) -> (Option<DVec3>, Option<DVec3>) {
     let (a, b) = (table.need(first, vec), table.need(second, vec));
     if a.is_some() && a == b {
@@ -220,7 +220,7 @@ pub(super) fn plane(table: Table, material: u32, lost: &mut Lost) -> Option<Plan
     lost.is_drawn(&[point], at).then(|| Plane { name, normal, offset: normal.dot(point), material })
 }
 
-/// `matrix`, or `scale`, then `rotate`, then `translate`.
+/// Reads `matrix`, or `scale`, then `rotate`, then `translate`.
 pub(super) fn transform(table: &Table) -> DAffine3 {
     let steps = ["scale", "rotate", "translate"].map(|key| table.has(key));
     if let Some(matrix) = table.get("matrix", matrix) {
@@ -254,7 +254,7 @@ fn rotation(value: &DeValue) -> Result<DQuat, String> {
     }
 }
 
-/// A turn about a unit axis, through our own sine so that every system places objects alike.
+/// Rotation about a unit axis, with `libm`'s sine so that every system places objects alike.
 fn turn(axis: DVec3, angle: f64) -> DQuat {
     let (sin, cos) = libm::sincos(angle * 0.5);
     DQuat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos)

@@ -26,7 +26,7 @@ fn the_schema_in_the_module_head_is_read_without_a_fault() {
     let head = include_str!("mod.rs");
     let block = head.split("```toml\n").nth(1).unwrap().split("//! ```").next().unwrap();
     let text: String = block.lines().map(|l| l.trim_start_matches("//!").trim_start()).collect::<Vec<_>>().join("\n");
-    // The model it names is not there, and that is all that is wrong.
+    // Its model does not exist, which is the only fault.
     let errors = faults(&text);
     assert!(errors.len() == 1 && errors[0].contains("bunny.obj"), "{errors:#?}");
     let without = text.replace("[[models]]", "[[unused]]");
@@ -143,7 +143,7 @@ fn all_files_that_are_not_there_are_told_at_once() {
 
 #[test]
 fn of_many_faults_the_first_are_listed_in_little_time() {
-    // Names that are not there, whose nearest is looked for; in one line, where columns are far from its start.
+    // Unknown names, whose nearest is searched; on one line, where columns are far from its start.
     let materials: String = (0..20_000).map(|i| format!("[materials.m{i}]\n")).collect();
     let wrong = "{ center = [0, 0, 0], radius = 1, material = 'n', radios = 1 },".repeat(20_000);
     let start = std::time::Instant::now();
@@ -160,7 +160,7 @@ fn of_many_faults_the_first_are_listed_in_little_time() {
         "{}",
         errors[19]
     );
-    // Those of syntax, too, and what is noted last may stand first.
+    // Also faults of syntax; a fault noted last may come first.
     let syntax = faults(&"=\n".repeat(100_000));
     assert_eq!((syntax.len(), start.elapsed().as_secs() < 60), (21, true));
     let first = faults(&format!("zzz = 1\n{}", "[[spheres]]\n".repeat(1000)));
@@ -255,7 +255,7 @@ fn lights_and_cameras_come_out_in_radians_and_world_space() {
     assert!((outer - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
     assert_eq!((scene.lights[0].intensity, scene.ambient), (Vec3::splat(2.0), Vec3::splat(0.2)));
     assert_eq!(scene.cameras[0].world_from_camera, DAffine3::from_translation(DVec3::new(0.0, 0.0, 25.0)));
-    // Straight down: up lies along the view, and the camera still stands on three axes.
+    // Straight down: up lies along the view, and the camera's axes are independent nevertheless.
     assert!((scene.cameras[1].world_from_camera.matrix3.determinant() - 1.0).abs() < 1e-12);
     assert_eq!(scene.cameras[1].projection, Projection::Orthographic { x_mag: 2.0, y_mag: 2.0 });
 }
@@ -304,7 +304,7 @@ fn what_several_models_show_is_read_once_and_stands_as_if_it_were_read_for_each(
     };
     let (once, each) = (load("m.nff"), load("copy.nff"));
     let stored = |loaded: &Loaded| (loaded.scene.meshes.len(), loaded.scene.materials.len());
-    // The one that is turned upright is another.
+    // The model that is turned upright is stored apart.
     assert_eq!((stored(&once), stored(&each)), ((2, 2), (3, 3)));
     let placed = |loaded: &Loaded| {
         let Scene { instances, spheres, cones, lights, cameras, .. } = &loaded.scene;
@@ -335,7 +335,7 @@ fn the_text_and_all_models_share_one_budget() {
     // Each with a material of its own, or they would be read and stored once.
     let model = |i: usize| format!("[materials.m{i}]\n[[models]]\nfile='m.obj'\nmaterial='m{i}'\n");
     let models = |count: usize| (0..count).map(model).collect::<String>();
-    // One needs most while it is read; what is kept of it is a fraction of that, but adds up.
+    // Reading a model takes most; what is kept is a fraction of that, but adds up.
     assert_eq!(fault(models(10), 8_000_000), Ok(10));
     let many = fault(models(100), 8_000_000).unwrap_err();
     assert!(many.contains("bytes are needed where") && many.ends_with("--max-memory"), "{many}");

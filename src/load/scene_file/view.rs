@@ -19,7 +19,7 @@ pub(super) enum Lit {
     Ambient(Vec3),
 }
 
-/// Reads one light; `None`: a fault was noted.
+/// Reads one light; `None` after a fault.
 #[expect(clippy::cast_possible_truncation, reason = "light is f32")]
 pub(super) fn light(table: Table) -> Option<Lit> {
     let kinds = [
@@ -46,7 +46,7 @@ pub(super) fn light(table: Table) -> Option<Lit> {
         }
         Some(Kind::Spot) => spot(&table),
         Some(Kind::Rectangle) => rectangle(&table),
-        // Which keys belong to an unknown kind cannot be said.
+        // The valid keys of an unknown kind are not known.
         None => return None,
     };
     let shadows = table.get("shadows", boolean).unwrap_or(true);
@@ -56,7 +56,7 @@ pub(super) fn light(table: Table) -> Option<Lit> {
         _ => 0.0,
     };
     table.finish();
-    // Directional lights are kept in lux, of which a white matt surface shows the π-th part; files give what it shows.
+    // Directional lights are kept in lux, of which a white matt surface reflects 1/π; files give the reflected value.
     let lux = if matches!(kind, Some(Kind::Directional)) { std::f32::consts::PI } else { 1.0 };
     place.map(|kind| Lit::Light(Light { name, intensity: intensity * lux, kind, shadows, size }))
 }
@@ -109,7 +109,7 @@ pub(super) fn camera(table: Table, up: DVec3) -> Option<Camera> {
         table.note(&table.place_of("eye"), "`eye` and `at` are one point, so the camera looks nowhere", "move one");
     }
     let projection = match ortho {
-        // The width follows from the picture's shape.
+        // The width follows from the picture's aspect ratio.
         Some(height) => Projection::Orthographic { x_mag: height * 0.5, y_mag: height * 0.5 },
         None => Projection::Perspective { y_fov: fov.unwrap_or(45.0).to_radians(), aspect: None },
     };

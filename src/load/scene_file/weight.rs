@@ -1,9 +1,9 @@
-//! What a TOML text takes in memory once it is parsed, by its signs alone.
+//! Estimate of the memory of a parsed TOML text, by its characters alone.
 
-/// Bytes that parsing a text, and keeping what it says, takes at most: by what the tokens, values and tables that a sign
-/// stands for were measured to take, a little more than that.
+/// Upper bound of the bytes that parsing a text and keeping its values takes, from the measured memory of the tokens, values
+/// and tables that each character stands for, with a small margin.
 pub(super) fn weight(text: &str) -> u64 {
-    /// An entry: its key, the table that is grown by it, its value.
+    /// An entry: its key, the growth of its table, its value.
     const ENTRY: u64 = 450;
     /// A table of its own, which each part of a dotted key makes.
     const TABLE: u64 = 650;
@@ -12,9 +12,9 @@ pub(super) fn weight(text: &str) -> u64 {
     const OPEN: u64 = 200;
     const CLOSE: u64 = 100;
     const LINE: u64 = 80;
-    /// The text itself, its names and strings.
+    /// A byte of the text itself, its names and strings.
     const BYTE: u64 = 4;
-    // Dots since the last sign that can stand before a key: of a number, unless the key ends.
+    // Dots since the last character that can precede a key: they belong to numbers, unless the key ends here.
     let (mut bytes, mut dots) = (0u64, 0u64);
     for sign in text.bytes() {
         let (own, ends_key) = match sign {

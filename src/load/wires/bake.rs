@@ -1,4 +1,4 @@
-//! Wires turned and stretched as their place says -> meshes of solids with the world's axes.
+//! Wires under the linear part of a transform -> meshes of solids with the world's axes.
 
 use super::solid::{Solid, octahedron, prism, roof, square, tetrahedron};
 use super::{Widths, Wires};
@@ -8,18 +8,18 @@ use crate::math::{DMat3, DVec3, Vec3, Vec4};
 use crate::scene::Mesh;
 use rayon::prelude::*;
 
-/// Solids, around where they stand.
+/// Solids, relative to a centre.
 pub(super) struct Baked {
     pub meshes: Vec<Mesh>,
     pub center: DVec3,
-    /// Points and lines that have no finite place.
+    /// Number of points and lines without a finite position.
     pub dropped: u64,
 }
 
-/// Points and lines of one mesh, so that its corners can be counted.
+/// Number of wires per mesh, so that its corners can be indexed.
 const RUN: usize = 1 << 24;
 
-/// Bytes that the solids of `wires` take, at most: in meshes, and beside these while they are made.
+/// Upper bounds of the bytes of the solids of `wires`: in meshes, and temporarily while they are made.
 pub(super) fn cost(wires: &Wires, widths: &Widths) -> [u64; 2] {
     let [points, lines] = wires.count();
     let mesh = &wires.mesh;
@@ -35,7 +35,7 @@ pub(super) fn cost(wires: &Wires, widths: &Widths) -> [u64; 2] {
     [points.saturating_mul(point).saturating_add(lines.saturating_mul(line)), held]
 }
 
-/// How much of a solid there is.
+/// Size of a solid.
 #[derive(Clone, Copy)]
 struct Shape {
     corners: usize,
@@ -65,7 +65,7 @@ pub(super) fn bake(wires: &Wires, linear: DMat3, widths: &Widths) -> Baked {
     for (run, ends) in wires.ends.chunks(RUN).enumerate() {
         let mut whole = of.room(ends);
         for (batch, ends) in ends.chunks(BATCH).enumerate() {
-            // Below 2^32, as the numbers of their vertices are.
+            // Less than 2^32, like the indices of their vertices.
             #[expect(clippy::cast_possible_truncation, reason = "memory for 2^32 lines is not granted")]
             let part = |(i, ends)| of.solids(ends, (run * RUN + batch * BATCH + i * PART) as u32);
             let parts: Vec<(Mesh, u64)> = ends.par_chunks(PART).enumerate().map(part).collect();
@@ -81,11 +81,11 @@ pub(super) fn bake(wires: &Wires, linear: DMat3, widths: &Widths) -> Baked {
     out
 }
 
-/// Wires that one thread makes at a time, and those whose solids are kept beside the mesh that they belong to.
+/// Number of wires per parallel task, and per batch whose solids are held besides their mesh.
 const PART: usize = 1 << 12;
 const BATCH: usize = 1 << 15;
 
-/// Adds a mesh whose triangles count its own vertices.
+/// Appends a mesh, offsetting its vertex indices.
 #[expect(clippy::cast_possible_truncation, reason = "runs are short enough")]
 fn append(whole: &mut Mesh, part: Mesh) {
     let first = whole.positions.len() as u32;
@@ -100,7 +100,7 @@ fn append(whole: &mut Mesh, part: Mesh) {
     }
 }
 
-/// What wires are made into solids with.
+/// Parameters of baking.
 struct Baking<'a> {
     wires: &'a Wires,
     widths: &'a Widths,
@@ -109,7 +109,7 @@ struct Baking<'a> {
 }
 
 impl Baking<'_> {
-    /// An empty mesh with room for the solids of these.
+    /// Empty mesh with capacity for the solids of `ends`.
     fn room(&self, ends: &[[u32; 2]]) -> Mesh {
         let from = &self.wires.mesh;
         let points = ends.iter().filter(|[a, b]| a == b).count();
@@ -131,7 +131,7 @@ impl Baking<'_> {
         }
     }
 
-    /// The solids of these, of which the first has this number, and how many have none.
+    /// Solids of `ends`, the first of which has the index `number`; and the number of wires without one.
     fn solids(&self, ends: &[[u32; 2]], number: u32) -> (Mesh, u64) {
         let Self { wires, widths, turn, center } = self;
         let place = |vertex: u32| match wires.mesh.positions.get(vertex as usize) {
@@ -147,7 +147,7 @@ impl Baking<'_> {
             match up {
                 Some(up) if a != b => baker.push(&roof([a, b], up, width), vertices, number),
                 None if a != b => baker.push(&prism([a, b], width), vertices, number),
-                // A point, or a line without length.
+                // A point, or a line of length 0.
                 Some(up) => baker.push(&square(a, up, width), [first; 4], number),
                 None if widths.crowd => baker.push(&tetrahedron(a, width), [first; 4], number),
                 None => baker.push(&octahedron(a, width), [first; 6], number),
@@ -161,12 +161,12 @@ fn named(from: &Mesh) -> Mesh {
     Mesh { name: from.name.clone(), uvs: vec![Vec::new(); from.uvs.len()], ..Mesh::default() }
 }
 
-/// What a place does to directions.
+/// Effect of a transform on directions.
 struct Turn {
     linear: DMat3,
-    /// For normals.
+    /// Matrix for normals.
     normal: DMat3,
-    /// −1 where it mirrors.
+    /// −1 for mirroring transforms, else 1.
     sign: f64,
 }
 
@@ -174,7 +174,7 @@ impl Turn {
     fn new(linear: DMat3) -> Self {
         let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
         let sign = if linear.determinant() < 0.0 { -1.0 } else { 1.0 };
-        // The inverse transpose up to its length, which also exists where there is no inverse.
+        // The inverse transpose up to its scale, which exists even for singular matrices.
         let normal = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
         Self { linear, normal, sign }
     }
@@ -198,14 +198,14 @@ struct Baker<'a> {
 }
 
 impl Baker<'_> {
-    /// The mean direction that the normals of both ends have in the world; `None` without normals.
+    /// Mean direction of the normals of both ends, in world space; `None` without normals.
     fn up(&self, first: u32, second: u32) -> Option<DVec3> {
         let normal = |vertex: u32| self.from.normals.get(vertex as usize).map(|&n| self.turn.normal(n));
         let (a, b) = (normal(first)?, normal(second)?);
         Some((a + b).try_normalize().unwrap_or(a))
     }
 
-    /// Adds a solid whose corners have what `vertices` have; counts it where single precision leaves it no extent.
+    /// Adds a solid whose corners take the attributes of `vertices`; counts it as dropped where rounding to `f32` collapses it.
     fn push<const N: usize>(&mut self, solid: &Solid<N>, vertices: [u32; N], number: u32) {
         let corners = solid.corners.map(|corner| corner.as_vec3());
         let apart = |t: &[u32; 3]| {

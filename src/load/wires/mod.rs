@@ -1,16 +1,16 @@
-//! Points and lines -> thin solids, since rays meet only what has an extent.
+//! Points and lines -> thin solids, since rays hit only what has an extent.
 //!
-//! Formats give points and lines no width; programs that draw them in pixels choose one. Here they have a width in the
-//! world, so that they stand in perspective, hide and are hidden, and are hit like every other triangle: 1/256 of the
-//! diagonal of the box around everything in the file (but for a few points far away), or less where there are so many that
-//! they would run together (`Widths`). A point becomes an octahedron, or a tetrahedron where it is one of a crowd; a
-//! line a prism of three sides, half a width longer at each end, so that joints are closed.
+//! Formats give points and lines no width; programs that draw them in pixels choose one. Here they have a width in world
+//! units, so that they appear in perspective, occlude and are occluded, and are hit like every other triangle: 1/256 of the
+//! diagonal of the bounds of everything in the file (except a few stray points), or less where there are so many that
+//! they would merge (`Widths`). A point becomes an octahedron, or a tetrahedron where there are very many; a
+//! line a prism with three sides, half a width longer at each end, so that joints are closed.
 //!
-//! Where vertices have no normals nothing says how light meets a line: such ones are drawn without light, in their base
-//! colour plus emission, as the glTF 2.0 specification recommends (§3.9.6). Where they have, they are lit by these: points
-//! are squares then, lines low roofs, whose faces look where the normals do. They are never of glass: they have no inside,
-//! and light that goes through thousands of them has no end. Whatever their places do (scale, shear, mirror), widths are
-//! those of the world: solids are made there, once for all places that differ by a shift alone.
+//! Wires whose vertices have no normals have no defined shading: they are drawn without light, in their base
+//! colour plus emission, as the glTF 2.0 specification recommends (§3.9.6). With normals they are lit by these: points
+//! are squares then, lines low roofs, whose faces point along the normals. They are never of glass: they have no inside,
+//! and light through thousands of them would never end. Whatever the transform of an instance (scale, shear, mirror), widths
+//! are in world units: solids are made in world space, once for all instances that differ by a translation alone.
 
 mod bake;
 mod solid;
@@ -31,14 +31,14 @@ use std::path::Path;
 /// Points and lines that share a material, before they have a width.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Wires {
-    /// Their vertices and material; no faces.
+    /// Vertices and material; no faces.
     pub mesh: Mesh,
-    /// The vertices at both ends of each line; the same one twice for a point.
+    /// Vertices at both ends of each line; the same one twice for a point.
     pub ends: Vec<[u32; 2]>,
 }
 
 impl Wires {
-    /// How many points and how many lines.
+    /// Number of points and number of lines.
     fn count(&self) -> [u64; 2] {
         let points = self.ends.iter().filter(|[a, b]| a == b).count() as u64;
         [points, self.ends.len() as u64 - points]
@@ -49,12 +49,12 @@ impl Wires {
     }
 }
 
-/// Points and lines of a file, and how they are drawn.
+/// Statistics of the points and lines of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WireFacts {
-    /// Points.
+    /// Number of points.
     pub points: u64,
-    /// Lines; those of a strip one by one.
+    /// Number of lines; each segment of a strip counts.
     pub lines: u64,
     /// Width of the points, world units; 0 without points.
     pub point_width: f64,
@@ -63,12 +63,12 @@ pub struct WireFacts {
 }
 
 impl WireFacts {
-    /// Width of the narrower ones, world units; `None` where there are neither.
+    /// Smaller of the two widths, world units; `None` where there are neither points nor lines.
     pub fn narrowest(&self) -> Option<f64> {
         [self.point_width, self.line_width].into_iter().filter(|&width| width > 0.0).reduce(f64::min)
     }
 
-    /// Adds those of another file; the larger width is told.
+    /// Adds the facts of another file; keeps the larger widths.
     pub fn append(&mut self, more: &Self) {
         self.points += more.points;
         self.lines += more.lines;
@@ -77,29 +77,29 @@ impl WireFacts {
     }
 }
 
-/// Parts of the diagonal that points and lines are wide at most.
+/// Ratio of the diagonal to the largest width.
 const PARTS: f64 = 256.0;
 
-/// So many points, or lines, are a crowd: they get as few triangles as a solid can have.
+/// Number of points, or lines, from which on they get as few triangles as a solid can have.
 const CROWD: u64 = 1 << 16;
 
-/// How wide points and lines are, world units.
+/// Widths of points and lines, world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Widths {
     point: f64,
     line: f64,
-    /// Whether there is a crowd of points.
+    /// Whether there are at least [`CROWD`] points.
     crowd: bool,
 }
 
 impl Widths {
-    /// For so many points and lines in a box with this diagonal.
+    /// Widths for these numbers of points and lines in a box with this diagonal.
     ///
-    /// N points spread over a surface as large as the box are about diagonal / √N apart: wider ones would run together.
-    /// Lines are kept to a quarter of that, so that a mesh of wires shows what lies behind. `asked` goes before all that.
+    /// N points spread over a surface as large as the box are about diagonal / √N apart: wider ones would merge.
+    /// Lines get a quarter of that, so that a wire mesh shows what lies behind. `asked` overrides all that.
     #[expect(clippy::cast_precision_loss, reason = "counts of what is in memory")]
     fn new([points, lines]: [u64; 2], diagonal: f64, asked: Option<[f64; 2]>) -> Self {
-        // A single place has no size: any will do, since the camera is framed on what is drawn.
+        // A single point has no extent: any width will do, since the camera is framed on the scene.
         let diagonal = if diagonal > 0.0 && diagonal.is_finite() { diagonal } else { PARTS };
         let point = diagonal / (points as f64).sqrt().max(PARTS);
         let line = diagonal / (4.0 * (lines as f64).sqrt()).max(PARTS);
@@ -108,14 +108,14 @@ impl Widths {
     }
 }
 
-/// Puts points and lines into the scene as solids; `places` are instances whose `mesh` counts `wires`.
+/// Adds points and lines to the scene as solids; `places` are instances whose `mesh` is an index into `wires`.
 ///
-/// Meshes are in place before: the width goes by the box around all of it. Points and lines with an end that is not finite,
-/// or so far away that rounding leaves nothing of their width, are left out and counted in `facts`; a warning is returned
-/// of them, and one of glass. `widths` of points and lines are those that were asked for.
+/// Meshes must be in the scene before: the width depends on the bounds of everything. Points and lines with an end that is not
+/// finite, or so far away that rounding leaves nothing of their width, are left out and counted in `facts`; returns warnings
+/// about them, and about glass. `widths` of points and lines are those of the user.
 ///
 /// # Errors
-/// When the solids would take more than is left of `budget`.
+/// When the solids would exceed `budget`.
 pub(super) fn draw(
     wires: &[Wires],
     places: &[Instance],
@@ -133,7 +133,7 @@ pub(super) fn draw(
     let count = placed.fold([0, 0], |[p, l], [q, m]| [p + q, l + m]);
     let widths = Widths::new(count, diagonal(wires, places, scene), widths);
     let mut drawing = Drawing { scene, budget, widths, materials: HashMap::new(), dropped: 0, of_glass: 0 };
-    // Of all, in their order: the same materials at every moment of an animation, whatever it hides.
+    // For all wires, in their order: the same materials at every moment of an animation, whatever it hides.
     wires.iter().for_each(|of| _ = drawing.material(of));
     let mut known: HashMap<(u32, [u64; 9]), Vec<Part>> = HashMap::new();
     for place in places {
@@ -161,10 +161,10 @@ pub(super) fn draw(
     Ok(told(file, dropped, of_glass))
 }
 
-/// Why points and lines are left out.
+/// Reason why points and lines are left out.
 const NOT_FINITE: &str = "a point or line with an end that is not finite or too far away to have a width";
 
-/// Warnings of so many points and lines that are left out, and so many materials that are not drawn as they are.
+/// Warnings about the numbers of wires left out, and of glass materials that are drawn solid.
 fn told(file: &Path, dropped: u64, of_glass: u64) -> Vec<Diagnostic> {
     let kinds = [
         ("line-not-finite", format!("{NOT_FINITE} is left out"), dropped),
@@ -178,23 +178,23 @@ fn told(file: &Path, dropped: u64, of_glass: u64) -> Vec<Diagnostic> {
     .collect()
 }
 
-/// The number of a mesh of solids, and its place around that of the wires.
+/// Index of a mesh of solids, and its position relative to the centre of the wires' mesh.
 type Part = (u32, DVec3);
 
-/// What solids are put into.
+/// State of [`draw`].
 struct Drawing<'a> {
     scene: &'a mut Scene,
     budget: &'a mut Budget,
     widths: Widths,
-    /// The material that wires show, by that of the file and whether they are lit.
+    /// Material of the wires, by the file's material and whether they are lit.
     materials: HashMap<(u32, bool), u32>,
     dropped: u64,
-    /// Materials that are drawn solid.
+    /// Number of glass materials that are drawn solid.
     of_glass: u64,
 }
 
 impl Drawing<'_> {
-    /// Makes the solids of wires that are turned and stretched by `linear`: meshes, and where they stand.
+    /// Makes the solids of wires transformed by `linear`: meshes, and their positions.
     fn bake(&mut self, wires: &Wires, linear: DMat3) -> Result<Vec<Part>, OverBudget> {
         let [kept, held] = bake::cost(wires, &self.widths);
         self.budget.take(kept, 1)?;
@@ -204,7 +204,7 @@ impl Drawing<'_> {
         self.dropped += dropped;
         let mut parts = Vec::with_capacity(meshes.len());
         for mesh in meshes {
-            // Checked by the budget: each mesh takes hundreds of bytes.
+            // Guaranteed by the budget: each mesh takes hundreds of bytes.
             #[expect(clippy::cast_possible_truncation, reason = "scenes have fewer than 2^32 meshes")]
             parts.push((self.scene.meshes.len() as u32, center));
             self.scene.meshes.push(Mesh { material, is_wire: true, ..mesh });
@@ -219,7 +219,7 @@ impl Drawing<'_> {
         }
     }
 
-    /// What the wires show of their material: both sides where they are flat, no light where they have no normals, never
+    /// Material as the wires show it: double-sided where they are flat, unlit where they have no normals, never
     /// glass.
     fn material(&mut self, wires: &Wires) -> u32 {
         let (from, is_lit) = (wires.mesh.material, wires.is_lit());
@@ -241,13 +241,13 @@ impl Drawing<'_> {
     }
 }
 
-/// A material as wires with normals show it.
+/// Material for wires with normals.
 fn lit(material: &Material) -> Material {
     let reflection = material.reflection.clone().without_transmission();
     Material { double_sided: true, reflection, ..material.clone() }
 }
 
-/// A material as wires without normals show it.
+/// Material for wires without normals.
 fn unlit(material: &Material) -> Material {
     Material {
         double_sided: false,
@@ -259,12 +259,12 @@ fn unlit(material: &Material) -> Material {
     }
 }
 
-/// How many times as large as the room of half of the points a box may be whose diagonal tells how wide they are: spread
-/// evenly over it, they make it twice as large.
+/// Largest ratio of the diagonal of all points' bounds to that of the inner half's bounds at which the former sets the width.
+/// Points spread evenly over the bounds have a ratio of two.
 const STRAY: f64 = 16.0;
 
-/// Diagonal of the box around all meshes and wires where they stand, or twice that of the room of half of their points where
-/// others are far away, as returns of a scanner from nowhere are; not positive where there is nothing.
+/// Diagonal of the bounds of all meshes and wires in the world, or twice that of the inner half of their points where
+/// others are far away, such as a scanner's stray returns; not positive where there is nothing.
 fn diagonal(wires: &[Wires], places: &[Instance], scene: &Scene) -> f64 {
     let of_wires = || places.iter().filter_map(|place| Some((place, &wires.get(place.mesh as usize)?.mesh)));
     let of_meshes = || scene.instances.iter().filter_map(|place| Some((place, scene.meshes.get(place.mesh as usize)?)));

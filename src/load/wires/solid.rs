@@ -1,24 +1,24 @@
-//! The smallest shapes that stand for a point or a line, corner by corner.
+//! The smallest solids that stand for a point or a line.
 //!
-//! They are as wide as the ball or round rod they stand for, seen from all sides in the mean: the shadow of a convex solid
-//! has a quarter of its surface, and that of a convex rod its perimeter over π (A. Cauchy, "Mémoire sur la
+//! They are as wide as the ball or round rod they stand for, averaged over all views: the mean shadow of a convex solid
+//! has a quarter of its surface, and that of a convex rod is its perimeter over π wide (A. Cauchy, "Mémoire sur la
 //! rectification des courbes et la quadrature des surfaces courbes", 1832).
 //!
-//! What has a normal is lit by it, so that its faces should look where the normal points, or not far from there: a point
-//! becomes a flat piece of the surface that it was taken from (H. Pfister et al., "Surfels: Surface Elements as Rendering
+//! Solids with a normal are lit by it, so their faces should point along the normal, or nearly so: a point
+//! becomes a flat piece of the surface that it was sampled from (H. Pfister et al., "Surfels: Surface Elements as Rendering
 //! Primitives", 2000), a line a low roof over it.
 
 use crate::math::DVec3;
 use std::f64::consts::{FRAC_PI_3, PI};
 
-/// Corners around the middle, and triangles counter-clockwise seen from outside.
+/// Corners, and triangles that run counter-clockwise seen from outside.
 #[derive(Clone, Debug)]
 pub(super) struct Solid<const CORNERS: usize> {
     pub corners: [DVec3; CORNERS],
     pub triangles: &'static [[u32; 3]],
 }
 
-/// An octahedron for a point without a direction: surface 4√3 r², so that √3 r² = π w²/4.
+/// Octahedron for a point without a normal: surface 4√3 r², so that √3 r² = π w²/4.
 pub(super) fn octahedron(at: DVec3, width: f64) -> Solid<6> {
     const TRIANGLES: [[u32; 3]; 8] =
         [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
@@ -27,7 +27,7 @@ pub(super) fn octahedron(at: DVec3, width: f64) -> Solid<6> {
     Solid { corners: axes.map(|axis| at + axis * r), triangles: &TRIANGLES }
 }
 
-/// A tetrahedron for one of many points without a direction: surface 8/√3 r², so that 2/√3 r² = π w²/4.
+/// Tetrahedron for one of many points without a normal: surface 8/√3 r², so that 2/√3 r² = π w²/4.
 pub(super) fn tetrahedron(at: DVec3, width: f64) -> Solid<4> {
     const TRIANGLES: [[u32; 3]; 4] = [[1, 2, 3], [0, 2, 1], [0, 3, 2], [0, 1, 3]];
     let r = width * (PI * 3f64.sqrt() / 8.0).sqrt();
@@ -37,7 +37,7 @@ pub(super) fn tetrahedron(at: DVec3, width: f64) -> Solid<4> {
     Solid { corners, triangles: &TRIANGLES }
 }
 
-/// A square of a disc's area that looks towards the unit vector `up`, for a point with that normal.
+/// Square of a disc's area that faces along the unit vector `up`, for a point with that normal.
 pub(super) fn square(at: DVec3, up: DVec3, width: f64) -> Solid<4> {
     let half = width * PI.sqrt() / 4.0;
     let (x, y) = up.any_orthonormal_pair();
@@ -45,7 +45,7 @@ pub(super) fn square(at: DVec3, up: DVec3, width: f64) -> Solid<4> {
     Solid { corners, triangles: &[[0, 1, 2], [0, 2, 3]] }
 }
 
-/// A prism of three even sides from `a` to `b`, which are not in one place. Perimeter 3√3 r, so that 3√3 r/π = w.
+/// Prism with an equilateral cross-section from `a` to `b`, which differ. Perimeter 3√3 r, so that 3√3 r/π = w.
 pub(super) fn prism([a, b]: [DVec3; 2], width: f64) -> Solid<6> {
     let r = width * PI / 27f64.sqrt();
     let frame = Frame::new([a, b], (b - a).any_orthonormal_vector());
@@ -56,7 +56,7 @@ pub(super) fn prism([a, b]: [DVec3; 2], width: f64) -> Solid<6> {
     frame.tube([a, b], [corner(0.0), corner(2.0 * FRAC_PI_3), corner(4.0 * FRAC_PI_3)], width)
 }
 
-/// A prism whose ridge is on the side of `up`, with two faces that lean 30 degrees to both sides of it. They and the floor
+/// Prism with its ridge towards `up`, and two faces that slope by 30 degrees to both sides of it. They and the floor
 /// of half width h have a perimeter of 2h + 4h/√3, which over π is w.
 pub(super) fn roof([a, b]: [DVec3; 2], up: DVec3, width: f64) -> Solid<6> {
     let half = width * PI / (2.0 + 4.0 / 3f64.sqrt());
@@ -66,7 +66,7 @@ pub(super) fn roof([a, b]: [DVec3; 2], up: DVec3, width: f64) -> Solid<6> {
     frame.tube([a, b], [frame.up * (0.5 * rise), floor(1.0), floor(-1.0)], width)
 }
 
-/// Unit vectors along a line and across it; they turn to the right.
+/// Unit vectors along a line and across it, right-handed.
 struct Frame {
     along: DVec3,
     up: DVec3,
@@ -74,15 +74,15 @@ struct Frame {
 }
 
 impl Frame {
-    /// With `up` as near to the given one as can be.
+    /// Frame with `up` as near to the given vector as possible.
     fn new([a, b]: [DVec3; 2], up: DVec3) -> Self {
         let along = (b - a).normalize_or(DVec3::X);
         let up = (up - along * along.dot(up)).try_normalize().unwrap_or_else(|| along.any_orthonormal_vector());
         Self { along, up, side: along.cross(up) }
     }
 
-    /// A prism around a line, half a width longer at both ends; `ring` goes from up to the side. Corners 0, 1, 2 are around
-    /// `a`, the rest around `b`.
+    /// Prism around a line, half a width longer at both ends; `ring` is its cross-section, from up to the side. Corners 0, 1, 2
+    /// are around `a`, the others around `b`.
     fn tube(&self, [a, b]: [DVec3; 2], [p, q, r]: [DVec3; 3], width: f64) -> Solid<6> {
         const TRIANGLES: [[u32; 3]; 8] =
             [[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]];
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
     use std::collections::HashMap;
 
-    /// Every edge is walked once in each direction.
+    /// Whether every edge is traversed once in each direction.
     fn is_closed(triangles: &[[u32; 3]]) -> bool {
         let mut walks: HashMap<(u32, u32), i32> = HashMap::new();
         for [a, b, c] in triangles {
@@ -108,7 +108,7 @@ mod tests {
         walks.iter().all(|(&(a, b), &n)| n == 1 && walks.get(&(b, a)) == Some(&1))
     }
 
-    /// Volume, positive when all faces look outwards, and surface.
+    /// Volume, positive when all faces point outwards, and surface area.
     fn measure<const N: usize>(solid: &Solid<N>) -> (f64, f64) {
         let faces = solid.triangles.iter().map(|t| t.map(|i| solid.corners[i as usize]));
         faces.fold((0.0, 0.0), |(volume, surface), [a, b, c]| {
@@ -116,7 +116,7 @@ mod tests {
         })
     }
 
-    /// The direction that a face looks in.
+    /// Outward unit normal of a face.
     fn outward<const N: usize>(solid: &Solid<N>, face: usize) -> DVec3 {
         let [a, b, c] = solid.triangles[face].map(|i| solid.corners[i as usize]);
         (b - a).cross(c - a).normalize()
@@ -154,7 +154,7 @@ mod tests {
         let up = DVec3::new(2.0, -1.0, 2.0) / 3.0;
         let square = square(DVec3::X, up, 0.1);
         assert!((outward(&square, 0) - up).length() < 1e-9 && (outward(&square, 1) - up).length() < 1e-9);
-        // Of a line that leans against the normal, what of it is across.
+        // For a line that leans against the normal, the part of the normal across it counts.
         let roof = roof([DVec3::ZERO, DVec3::X], DVec3::new(0.6, 0.8, 0.0), 0.1);
         for face in [2, 3, 6, 7] {
             let cosine = outward(&roof, face).dot(DVec3::Y);

@@ -43,7 +43,7 @@ fn middle(points: &[DVec3]) -> DVec3 {
     points.iter().sum::<DVec3>() / points.len() as f64
 }
 
-/// How far the corners of a prism are from the line between the middles of its ends.
+/// Distances of the corners of a prism from the line between the centres of its ends.
 fn thickness(corners: &[DVec3]) -> f64 {
     let (a, b) = (middle(&corners[..3]), middle(&corners[3..]));
     let along = (b - a).normalize();
@@ -219,7 +219,7 @@ fn more_than_memory_allows_is_refused_before_it_is_made() {
 
 #[test]
 fn no_corner_of_a_solid_meets_another() {
-    // A line a million times as long as it is wide, far from where the file begins.
+    // A line a million times as long as it is wide, far from the file's origin.
     let of = wires(&[[1e6, 0.0, 0.0], [1e6 + 1.0, 1.0, 0.0]], &[[0, 1], [0, 0]]);
     let (scene, _, warnings) = drawn(&[of], &[place(0, DAffine3::IDENTITY)]);
     let distinct: HashSet<_> = scene.meshes[0].positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
@@ -228,7 +228,7 @@ fn no_corner_of_a_solid_meets_another() {
 
 #[test]
 fn many_wires_are_the_solids_of_each_in_their_order() {
-    // More than one thread makes at a time, points and lines mixed, some of them nowhere.
+    // Enough wires for several parallel tasks, points and lines mixed, some with NaN positions.
     let at = |i: u16| match i {
         _ if i % 5000 == 17 => [f32::NAN; 3],
         _ => [f32::from(i % 100), f32::from(i / 100), f32::from(i % 7)],

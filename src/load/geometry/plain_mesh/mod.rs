@@ -1,7 +1,7 @@
-//! Vertices and faces that come without a text of statements, as in PLY and STL files -> scene.
+//! Vertices and faces without statements, as in PLY and STL files -> scene.
 //!
-//! They go the way of an OBJ's: centred and rounded, cut or kept whole, stood upright. What faces and corners have of their
-//! own goes to vertices (`wedges`); their material shows a picture (`pictures`), or is plain.
+//! They are processed like an OBJ's: centred and rounded, cut or kept whole, turned upright. Attributes of faces and corners
+//! move to vertices (`wedges`); their material shows a picture (`pictures`), or is plain.
 
 mod pictures;
 mod wedges;
@@ -17,60 +17,60 @@ use bytemuck::allocation::try_cast_vec;
 use rayon::prelude::*;
 use std::path::Path;
 
-/// What a file of bare geometry holds. Lists that go with the vertices are as long as [`Self::positions`], or empty.
+/// Contents of a file of bare geometry. Lists of vertex attributes are as long as [`Self::positions`], or empty.
 #[derive(Clone, Debug, Default)]
 pub(in crate::load) struct PlainMesh {
     pub positions: Vec<DVec3>,
-    /// Of any length; zero where there is none.
+    /// Normals of any length; zero for none.
     pub normals: Vec<Vec3>,
-    /// v points up.
+    /// Texture coordinates, v upwards.
     pub uvs: Vec<DVec2>,
-    /// sRGB-coded, and opacity: 0…1 where whole numbers say so, floats as written.
+    /// Colours, sRGB-coded, and opacity: 0…1 where the file has integers, floats as written.
     pub colors: Vec<[f32; 4]>,
-    /// Vertices of all faces, one face after another; each is there.
+    /// Vertices of all faces, one face after another; all in range.
     pub corners: Vec<u32>,
-    /// Corners of each face, at least 3.
+    /// Number of corners of each face, at least 3.
     pub arities: Vec<u32>,
-    /// Texture coordinates of corners: of the first ones, up to the last that has some. Where any has, those of vertices do not
-    /// count.
+    /// Texture coordinates of corners, up to the last corner that has some. If not empty, those of vertices are
+    /// ignored.
     corner_uvs: Vec<[f64; 2]>,
-    /// Colours of faces and of edges, as those of vertices, of which there are none then: of the first ones, up to the last
+    /// Colours of faces and of edges, encoded as those of vertices, which are empty then; up to the last face or edge
     /// that has one.
     face_colors: Vec<[f32; 4]>,
     edge_colors: Vec<[f32; 4]>,
-    /// Pictures that the file names, and in which line.
+    /// Pictures that the file names, with their lines.
     pub pictures: Vec<(u32, String)>,
-    /// Which of them faces show, or [`NONE`]: of the first ones, up to the last that says so; the others show the first.
+    /// Index of the picture of each face, or [`NONE`], up to the last face that names one; the others show the first.
     face_pictures: Vec<u32>,
-    /// Faces that had fewer.
+    /// Number of faces with fewer than 3 corners.
     pub few_corners: u64,
-    /// The vertices at both ends of each edge; each is there.
+    /// Vertices at both ends of each edge; all in range.
     pub edges: Vec<[u32; 2]>,
     /// Decimal places of the finest coordinate; `None` where coordinates are not written in digits.
     pub places: Option<i32>,
-    /// What the file says of itself.
+    /// Comments of the file.
     pub comments: Vec<String>,
-    /// What is told of it beside what becomes of faces.
+    /// Warnings, besides those about faces.
     pub told: Vec<Diagnostic>,
 }
 
-/// The colour of what has none: taken for no colour of a file, and still there when colours have been settled.
+/// Marks a missing colour: not mistaken for a colour of the file, and recognizable after colours have been settled.
 const UNSAID: [f32; 4] = [f32::NAN, f32::NAN, f32::NAN, f32::NEG_INFINITY];
 
-/// What a file may say of a face beside its corners.
+/// Attributes of a face besides its corners.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::load) struct Said<'a> {
-    /// Texture coordinates of its corners, v upwards; empty, or of each.
+    /// Texture coordinates of its corners, v upwards; empty, or one per corner.
     pub uvs: &'a [[f64; 2]],
-    /// As those of vertices.
+    /// Colour, encoded as those of vertices.
     pub color: Option<[f32; 4]>,
-    /// Which of [`PlainMesh::pictures`] it shows; [`NONE`]: none of them.
+    /// Index of its picture in [`PlainMesh::pictures`]; [`NONE`] for none.
     pub picture: Option<u32>,
 }
 
 impl PlainMesh {
-    /// Bytes that a vertex takes until it is part of a mesh: what the file says of it, twice in `f64`, in the mesh, and
-    /// its place in tables.
+    /// Bytes that a vertex takes until it is part of a mesh: its attributes, twice in `f64`, in the mesh, and
+    /// its entries in tables.
     const VERTEX: u64 = 192;
     /// Bytes that a corner takes: here, as that of a face, and in the mesh.
     const CORNER: u64 = 40;
@@ -82,35 +82,35 @@ impl PlainMesh {
     pub(in crate::load) const COLOR: u64 = 16;
     /// Bytes that the texture coordinates of a corner take: as read, and as those of a vertex, looked for in a table.
     pub(in crate::load) const CORNER_UV: u64 = 112;
-    /// The most vertices, corners or faces.
+    /// Largest number of vertices, corners or faces.
     pub(in crate::load) const LARGEST: u64 = LARGEST as u64;
 
-    /// What a file holds that names these pictures, before anything of it is read.
+    /// Empty mesh of a file that names these pictures.
     pub(in crate::load) fn showing(pictures: Vec<(u32, String)>) -> Self {
         Self { pictures, ..Self::default() }
     }
 
-    /// Takes the memory of so many vertices from a budget, before they are read.
+    /// Takes the memory of `count` vertices from a budget, before they are read.
     pub(in crate::load) fn charge_vertices(budget: &mut Budget, count: u64) -> Result<(), OverBudget> {
         budget.take(count, Self::VERTEX)
     }
 
-    /// Takes the memory of faces of so many corners each from a budget, before they are added.
+    /// Takes the memory of `count` faces of `arity` corners each from a budget, before they are added.
     pub(in crate::load) fn charge_faces(budget: &mut Budget, count: u64, arity: u64) -> Result<(), OverBudget> {
         budget.take(count, Self::FACE.saturating_add(Self::CORNER.saturating_mul(arity)))
     }
 
-    /// Triangles on these vertices, three corners each, which have as many colours, or none.
+    /// Mesh of triangles, three corners each, with one colour per triangle, or none.
     pub(in crate::load) fn of_triangles(positions: Vec<DVec3>, corners: Vec<u32>, colors: Vec<[f32; 4]>) -> Self {
         Self { arities: vec![3; corners.len() / 3], positions, corners, face_colors: colors, ..Self::default() }
     }
 
-    /// Whether there is nothing that joins its vertices: then they are points.
+    /// Whether nothing joins the vertices: then they are points.
     fn is_cloud(&self) -> bool {
         self.arities.is_empty() && self.edges.is_empty() && self.few_corners == 0
     }
 
-    /// Whether there are triangles, nothing else, and nothing is said of them but their vertices' places and colours.
+    /// Whether there are only triangles, without attributes except positions and colours of vertices.
     fn is_of_plain_triangles(&self) -> bool {
         let is_plain = self.normals.is_empty() && self.uvs.is_empty() && self.corner_uvs.is_empty();
         let triangles = self.corners.as_chunks::<3>().0.len();
@@ -145,7 +145,7 @@ impl PlainMesh {
         self.corners.extend_from_slice(corners);
     }
 
-    /// Adds triangles of which nothing is said but their corners.
+    /// Adds triangles without attributes.
     pub(in crate::load) fn triangles(&mut self, corners: &[u32]) {
         self.arities.resize(self.arities.len() + corners.len() / 3, 3);
         self.corners.extend_from_slice(corners);
@@ -161,11 +161,11 @@ impl PlainMesh {
     }
 }
 
-/// Makes the scene of faces and edges, or else of all vertices as points. `format` is the file's kind for reports;
-/// `otherwise` the up axis where nothing speaks for one, and why.
+/// Makes a scene of faces and edges, or else of all vertices as points. `format` is the name for reports;
+/// `otherwise` the default up axis, and the reason.
 ///
 /// # Errors
-/// When points and lines would take more than is left of the budget.
+/// When points and lines would exceed the budget.
 pub(in crate::load) fn load(
     mut bare: PlainMesh,
     format: &str,
@@ -207,11 +207,11 @@ pub(in crate::load) fn load(
     Ok(loaded)
 }
 
-/// [`geometry`] of plain triangles, of which no statements are made.
+/// [`geometry`] for plain triangles, without making statements.
 fn plain_triangles(bare: PlainMesh) -> Geometry {
     let (colors, alphas) = parts(bare.colors);
     let mut soup = Soup { positions: bare.positions, colors, alphas, ..Soup::default() };
-    // A list that has room for more is copied.
+    // A list with spare capacity is copied.
     let triangles = try_cast_vec(bare.corners).unwrap_or_else(|(_, corners)| corners.as_chunks().0.to_vec());
     soup.leave_out_unused(&triangles);
     Geometry {
@@ -226,23 +226,23 @@ fn plain_triangles(bare: PlainMesh) -> Geometry {
     }
 }
 
-/// Colours, and opacities where any is not opaque.
+/// Splits colours from opacities, which are empty where all are opaque.
 fn parts(colors: Vec<[f32; 4]>) -> (Vec<[f32; 3]>, Vec<f32>) {
     let alphas = color::opacities(&colors);
     (colors.into_par_iter().with_min_len(MANY).map(|[r, g, b, _]| [r, g, b]).collect(), alphas)
 }
 
-/// So many digits that the rounding to `f32` alone counts.
+/// Number of digits so large that only the rounding to `f32` counts.
 const EXACT: i32 = 30;
 
-/// The warning that no face shows a picture, though some may say which part of one.
+/// Warning that no face shows a picture, though some may have texture coordinates.
 fn picture_unused((line, name): &(u32, String), has_places: bool, file: &Path) -> Diagnostic {
     let why = if has_places { "no face shows it" } else { "no face says where it shows which part of it" };
     let text = format!("picture '{}' is not drawn: {why}", shorten(name));
     Diagnostic::new("picture-unused", file, line.to_string(), text)
 }
 
-/// Where the corners of faces with so many begin.
+/// Index of the first corner of each face.
 fn first_corners(arities: &[u32]) -> Vec<u32> {
     let mut next = 0;
     let first = |&arity: &u32| {
@@ -253,10 +253,10 @@ fn first_corners(arities: &[u32]) -> Vec<u32> {
     arities.iter().map(first).collect()
 }
 
-/// Vertices, corners or faces that one thread looks at at a time.
+/// Number of vertices, corners or faces per parallel task.
 const MANY: usize = 1 << 12;
 
-/// What the statements of an OBJ would leave of it: a run of plain faces, points and lines, and one of the faces that show each
+/// Geometry like that of an OBJ's statements: a run of plain faces, points and lines, and a run for the faces of each
 /// picture.
 #[expect(clippy::cast_possible_truncation, reason = "readers keep below PlainMesh::LARGEST")]
 fn geometry(mut bare: PlainMesh, file: &Path, warnings: &mut Warnings) -> Geometry {

@@ -1,4 +1,4 @@
-//! Pictures that files of bare geometry name -> the materials that show them.
+//! Pictures of files of bare geometry -> the materials that show them.
 
 use crate::load::finder::{Finder, FoundPath};
 use crate::load::mtl::{Materials, Reading, plain_material};
@@ -10,11 +10,11 @@ use crate::scene::{Material, Sampler, Texture, TextureRef, UvTransform};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// Reads the `pictures` of a file, which it names in these lines, and makes a material for each of `names`: one that shows the
-/// picture of that name, or a plain one where that cannot be, and for `None`.
+/// Reads the `pictures` of a file, which it names on these lines, and makes a material for each of `names`: one that shows the
+/// picture of that name, or a plain one for `None` and where the picture cannot be read.
 pub(super) fn load(pictures: &[(u32, String)], names: &[Option<&str>], reading: &mut Reading) -> Materials {
     let mut images: Vec<Encoded> = Vec::new();
-    // Of each name the place among them, and of each file: one may have many names.
+    // Index of the image by name, and by file: a file may have many names.
     let (mut known, mut files): (HashMap<&str, usize>, HashMap<PathBuf, usize>) = Default::default();
     let (wanted, mut missed): (HashSet<&str>, _) = (names.iter().flatten().copied().collect(), 0);
     for (line, name) in pictures.iter().filter(|(_, name)| wanted.contains(name.as_str())) {
@@ -79,7 +79,7 @@ fn showing(name: &str, texture: u32) -> Material {
 /// Finds a picture.
 ///
 /// # Errors
-/// The warning that it is not there.
+/// The warning that the picture does not exist.
 fn find(name: &str, place: &str, missed: &mut usize, reading: &mut Reading) -> Result<FoundPath, Diagnostic> {
     let mut finder = Finder { resolver: reading.resolver, missed };
     let found = finder.find(name, &[Path::new("")]).map_err(|fault| lost(&fault, place, reading.file))?;
@@ -93,7 +93,7 @@ fn find(name: &str, place: &str, missed: &mut usize, reading: &mut Reading) -> R
 /// Reads a picture.
 ///
 /// # Errors
-/// The warning that it cannot be read.
+/// The warning that the picture cannot be read.
 fn read(path: &Path, name: &str, place: &str, reading: &mut Reading) -> Result<Vec<u8>, Diagnostic> {
     let within = reading.resolver.read_file_within(path, reading.budget);
     let bytes = within.map_err(|fault| lost(&fault, place, reading.file))?;
@@ -105,8 +105,8 @@ fn lost(fault: &FileFault, place: &str, file: &Path) -> Diagnostic {
     Diagnostic { text: format!("picture {}; faces are drawn without it", warning.text), ..warning }
 }
 
-/// Takes colours from the vertices of meshes that show a picture: of what was scanned, both show the same light. What is told
-/// of that.
+/// Removes vertex colours from meshes that show a picture: in scans both hold the same light. Returns a warning about
+/// that.
 pub(super) fn leave_out_colors(loaded: &mut Loaded, file: &Path) -> Option<Diagnostic> {
     let scene = &mut loaded.scene;
     let shows = |material: u32| scene.materials.get(material as usize).is_some_and(|m| m.base_color_map.is_some());

@@ -1,5 +1,5 @@
-//! What files say of faces and of the corners of faces -> vertices: one for each colour that meets in a place, and one number
-//! for all equal texture coordinates there.
+//! Attributes of faces and corners -> vertices: one for each colour that meets at a position, and one number
+//! for equal texture coordinates there.
 
 use super::{PlainMesh, UNSAID};
 use crate::load::geometry::NONE;
@@ -11,11 +11,10 @@ use crate::scene::color::to_srgb;
 use rayon::prelude::*;
 
 impl PlainMesh {
-    /// Gives the colours of faces and edges, which are settled, to their corners. A vertex where several meet becomes several in
-    /// one place.
+    /// Moves the colours of faces and edges, which are settled, to their corners. A vertex where several colours meet is split.
     ///
     /// # Errors
-    /// When these would take more than is left of the budget.
+    /// When memory for the new vertices would exceed the budget.
     pub(super) fn color_vertices(&mut self, budget: &mut Budget) -> Result<(), OverBudget> {
         if self.face_colors.is_empty() && self.edge_colors.is_empty() {
             return Ok(());
@@ -48,8 +47,8 @@ impl PlainMesh {
         Ok(())
     }
 
-    /// Numbers the texture coordinates of corners, which take the place of those of vertices: equal ones of a vertex are one.
-    /// The number of each corner; [`NONE`] where it has none that are finite.
+    /// Numbers the texture coordinates of corners, which replace those of vertices: equal ones of a vertex share a number.
+    /// Returns the number of each corner; [`NONE`] where it has no finite coordinates.
     pub(super) fn number_uvs(&mut self) -> Vec<u32> {
         if self.corner_uvs.is_empty() {
             let number = |&vertex: &u32| match self.uvs.get(vertex as usize) {
@@ -62,7 +61,7 @@ impl PlainMesh {
         let mut pairs = Pairs::new(self.positions.len());
         let corners = self.corners.iter().zip(&self.corner_uvs);
         let number = |(&vertex, &uv): (&u32, &[f64; 2])| match DVec2::from(uv).is_finite() {
-            // Adding 0 makes one zero of two.
+            // Adding 0 maps −0 to +0.
             true => pairs.number(vertex, uv.map(|c| (c + 0.0).to_bits())),
             false => NONE,
         };
@@ -72,5 +71,5 @@ impl PlainMesh {
     }
 }
 
-/// Bytes that a corner takes while its vertex is looked for: its entry, and its share of a table.
+/// Bytes that a corner takes while its vertex is looked up: its entry, and its share of a table.
 const PAIR: u64 = 48;
