@@ -1,11 +1,11 @@
-//! meshray renders the mesh files people download (glTF 2.0, OBJ, PLY, STL) into pictures, on any CPU, and tells what
+//! meshray renders the mesh files people download (glTF 2.0, OBJ, PLY, STL) into pictures, on any CPU, and reports what
 //! the picture cost. It is a Whitted ray tracer (T. Whitted, "An Improved Illumination Model for Shaded Display", 1980)
-//! whose work is cut by a uniform grid with octrees in crowded cells; every way of culling gives the same hits as
+//! accelerated by a uniform grid with octrees in crowded cells; every acceleration structure gives the same hits as
 //! testing everything, bit for bit.
 //!
-//! # The way of the data
+//! # Data flow
 //! A file becomes a [`scene::Scene`] and warnings ([`load`]). [`render::World`] places its shapes in one centred `f32`
-//! frame; a structure over them ([`accel`]) answers what rays hit. [`render`] sends rays through it in waves, tile by
+//! frame; a structure over them ([`accel`]) intersects rays with them. [`render`] sends rays through it in waves, tile by
 //! tile, and gives linear pixels, which [`image`] turns into a PNG, EXR, JPEG or WebP.
 //!
 //! ```text
@@ -50,8 +50,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # A picture of one's own, as good as is asked
-//! A mesh that was made in memory, a camera, a lamp, and how wrong the picture is at most:
+//! # Rendering a mesh of your own to a given error
+//! A mesh made in memory, a camera, a lamp, and a bound on the error of the picture:
 //! ```
 //! use meshray::accel::{AccelChoice, AccelParams};
 //! use meshray::image::{Output, rgba8};
@@ -93,11 +93,11 @@
 //! assert!(pixels[30 * 64 + 32][0] > 100, "the side that the sun shines on");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//! In a program that is not optimised this takes many times as long; the README says how to have the library optimised all the
-//! same.
+//! In a program that is not optimised this takes many times as long; the README says how to have the library optimised
+//! nevertheless.
 //!
-//! # Rays of one's own
-//! A mesh that was made in memory, what rays hit of it, and how many tests that took:
+//! # Tracing rays of your own
+//! A mesh made in memory, the hits of rays on it, and the number of tests they took:
 //! ```
 //! use meshray::accel::{Accel, AccelKind, AccelParams, AccelChoice, Hit, NoProbe, RayCounts};
 //! use meshray::math::{DAffine3, DVec3, Vec3};
@@ -140,28 +140,28 @@
 //! # Ok::<(), meshray::scene::SceneFault>(())
 //! ```
 //!
-//! # What borrows what
-//! A [`render::World`] holds all shapes by itself. Structures borrow it, and a [`render::TextureStore`] the scene: they are made
-//! where they are used, as above, and live for as long as a request, a command or a thread's scope. A program that keeps a mesh
-//! for as long as it runs lends it for ever: `let world: &'static World = Box::leak(Box::new(World::new(&scene)))`.
+//! # Lifetimes
+//! A [`render::World`] owns all shapes. Structures borrow it, and a [`render::TextureStore`] borrows the scene: they are made
+//! where they are used, as above, and live for as long as a request, a command or a thread's scope. A program that keeps a
+//! mesh for as long as it runs leaks it: `let world: &'static World = Box::leak(Box::new(World::new(&scene)))`.
 //!
 //! # Modules
-//! | module | knows |
+//! | module | contents |
 //! |---|---|
-//! | [`math`] | only numbers: error bounds, eight lanes at once, rays against triangle, polygon, sphere, cone, plane, box |
+//! | [`math`] | numbers only: error bounds, eight SIMD lanes, rays against triangle, polygon, sphere, cone, plane, box |
 //! | [`scene`] | plain data with indices; which features a scene needs, default camera and light |
 //! | [`load`] | files -> scene and warnings: glTF, OBJ + MTL, PLY, STL, NFF, scene files |
-//! | [`accel`] | shapes -> what does this ray hit: `none`, `transform`, `spheres`, `boxes`, `bvh`, `grid`, `grid-octree`, `grid-bvh`, `octree`, `fast-octree`, `fast-bvh`; counts |
+//! | [`accel`] | shapes -> hits of rays: `none`, `transform`, `spheres`, `boxes`, `bvh`, `grid`, `grid-octree`, `grid-bvh`, `octree`, `fast-octree`, `fast-bvh`; counts |
 //! | [`mod@render`] | rays -> linear pixels: waves, shading models, lights and shadows, optics, textures |
 //! | [`image`] | linear pixels <-> files: tone mapping, formats, metadata, differences |
-//! | [`mod@bench`] | measures and compares: hard rays, exact answers, what came out |
+//! | [`mod@bench`] | measures and compares: hard rays, exact answers, results |
 //! | [`generate`] | scenes of any size for measurements |
 //! | [`save`] | scenes -> glTF, OBJ |
-//! | [`stopwatch`] | time on the wall and of the processor |
-//! | [`named`] | kinds whose values have names, as typed and printed |
-//! | [`number`] | numbers as people read them |
+//! | [`stopwatch`] | wall-clock and processor time |
+//! | [`named`] | enums whose values have names, as typed and printed |
+//! | [`number`] | numbers formatted for people |
 //! | [`huge_pages`] | arrays in large pages |
-//! | [`threads`] | worker threads, each on a processor of its own |
+//! | [`threads`] | worker threads, each pinned to a processor |
 //! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |
 //!
 //! `scene` and `accel` use `math`; `load` uses `scene`; `render` uses `scene`, `accel` and `image`; `bench` uses

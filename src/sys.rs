@@ -4,8 +4,8 @@
 
 use nix::sys::signal::{SigHandler, Signal, signal};
 
-/// Signals that end a process and that this one was started to ignore, as `nohup` does and shells do for background jobs of
-/// scripts.
+/// Signals that would end this process but that it was started to ignore, as `nohup` does and shells do for background jobs
+/// of scripts.
 pub(crate) fn ignored_ends() -> Vec<Signal> {
     [Signal::SIGHUP, Signal::SIGINT, Signal::SIGTERM].into_iter().filter(|end| is_ignored(*end)).collect()
 }

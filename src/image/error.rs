@@ -11,7 +11,7 @@ pub enum ImageError {
     UnknownKind {
         /// The output path as given.
         path: PathBuf,
-        /// Its extension with the dot and quotes, or `(no extension)`.
+        /// Extension of the path with the dot and quotes, or `(no extension)`.
         extension: String,
     },
     /// More columns or rows than the format can hold.
@@ -35,7 +35,7 @@ pub enum ImageError {
         height: u32,
         /// Name of the array.
         array: &'static str,
-        /// Its length.
+        /// Length of the array.
         len: usize,
     },
     /// The metadata does not fit the format.
@@ -61,7 +61,7 @@ pub enum ImageError {
     Decode {
         /// The format.
         kind: FileKind,
-        /// What is wrong.
+        /// Message of the decoder, or what is wrong.
         reason: String,
     },
     /// The bytes are not a picture of any kind that is read here.

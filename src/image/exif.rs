@@ -1,7 +1,7 @@
 //! Metadata in EXIF, for JPEG and WebP: a little TIFF directory with `ImageDescription` (all entries as one JSON
 //! object) and `Software`.
 //!
-//! Reading understands what [`write`] writes and TIFF directories like it; anything else is no metadata.
+//! Reading understands the output of [`write`] and similar TIFF directories; anything else counts as no metadata.
 
 use super::Metadata;
 use super::metadata::MAX_TEXT;
@@ -44,7 +44,7 @@ fn size(bytes: usize) -> [u8; 4] {
     u32::try_from(bytes).unwrap_or(u32::MAX).to_le_bytes()
 }
 
-/// JSON with everything beyond ASCII escaped, as EXIF texts are ASCII.
+/// Escapes everything beyond ASCII in JSON, as EXIF texts are ASCII.
 fn ascii_json(json: &str) -> String {
     let mut ascii = String::with_capacity(json.len());
     for c in json.chars() {

@@ -7,7 +7,7 @@ use super::text::without_mark;
 use super::{Diagnostic, Source};
 use std::path::Path;
 
-/// The kinds of file that can be loaded.
+/// Kinds of file that can be loaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
     Gltf,

@@ -120,7 +120,7 @@ impl From<Diagnostic> for LoadError {
 
 /// Collects warnings; repeated ones of a kind are counted.
 ///
-/// Only [`Self::KEPT`] kinds of one code are kept; the others become one last warning of that code, which counts them. So
+/// Only 20 kinds of one code are kept; the others become one last warning of that code, which counts them. So
 /// neither memory nor the list grows with the number of warnings.
 #[derive(Clone, Debug, Default)]
 pub struct Warnings {
@@ -155,7 +155,7 @@ impl Warnings {
         if *kept <= Self::KEPT {
             return self.keep(kind, warning);
         }
-        // Key that no kind has: their texts have no zero bytes.
+        // Key that no kind has: no text is a lone zero byte.
         let rest = (warning.code, PathBuf::new(), "\0".to_owned());
         match self.known.get(&rest) {
             Some(&at) => {

@@ -191,7 +191,7 @@ impl Facts {
 /// An animation of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AnimationFacts {
-    /// Its name; empty if it has none.
+    /// Name; empty if it has none.
     pub name: String,
     /// Time of the last key, in seconds from the start.
     pub seconds: f64,
@@ -202,7 +202,7 @@ pub struct AnimationFacts {
 /// A glTF extension that a file names.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ExtensionFacts {
-    /// Its name, such as `KHR_materials_volume`.
+    /// Name, such as `KHR_materials_volume`.
     pub name: String,
     /// Whether the file declares that it cannot be shown without the extension.
     pub required: bool,
@@ -215,7 +215,7 @@ pub struct ExtensionFacts {
 pub struct Source {
     /// Path of the file; a name without a folder such as `-` for standard input.
     pub path: PathBuf,
-    /// Its bytes.
+    /// Contents of the file.
     pub bytes: Vec<u8>,
     /// The archive that the file lies in, if any.
     pub within: Option<Arc<Archive>>,

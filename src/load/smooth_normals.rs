@@ -1,8 +1,8 @@
 //! Smooth normals for meshes without normals, on request: scans and printed solids consist of flat faces, but are meant to
 //! look round.
 //!
-//! The normal of a corner is the sum of the normals of those faces around its vertex that lean against its own face by no
-//! more than an angle, each weighted by its own angle there (G. Thürmer and C. A. Wüthrich, "Computing Vertex Normals from
+//! The normal of a corner is the sum of the normals of the faces around its vertex that lean against its own face by at
+//! most a given angle, each weighted by the face's angle there (G. Thürmer and C. A. Wüthrich, "Computing Vertex Normals from
 //! Polygonal Facets", 1998). Vertices at the same position count as one, across all meshes that stand together, so
 //! that neither a format that repeats them nor a change of material makes a seam.
 
@@ -20,7 +20,7 @@ const MOST_AROUND: usize = 512;
 /// meshes need none.
 ///
 /// # Errors
-/// When that takes more memory than is left of `budget`.
+/// When memory would exceed `budget`.
 pub(super) fn smooth(scene: &mut Scene, most: f64, budget: &mut Budget) -> Result<(), OverBudget> {
     let materials = &scene.materials;
     let is_unlit =

@@ -1,5 +1,5 @@
-//! Wavefront OBJ: positions and triangles, an object for each instance. Materials are left out, as they would be a second
-//! file, and shapes other than triangles.
+//! Wavefront OBJ: positions and triangles, an object for each instance. Materials, which would need a second file, and shapes
+//! other than triangles are left out.
 
 use std::io::{self, Write};
 

@@ -6,7 +6,7 @@ use crate::image::Layers;
 /// The difference of one layer that both pictures have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerDifference {
-    /// Name as in the file, such as `albedo`, `Z` or `id.prim`.
+    /// Name in the file, such as `albedo`, `Z` or `id.prim`.
     pub name: String,
     /// Root mean squared difference, over the pairs of values that are not finite in just one picture (a depth of a surface that
     /// only one shows is left out). Ids, such as `id.prim`, that differ count 1.

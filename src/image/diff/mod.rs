@@ -27,7 +27,7 @@ pub enum Space {
 /// not fully covered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// Channels compared: 3 or 4.
+    /// Number of channels compared: 3 or 4.
     pub channels: u32,
     /// Root mean squared difference.
     pub rmse: f64,
@@ -42,9 +42,9 @@ pub struct Difference {
     pub worst: (u32, u32),
     /// Peak signal-to-noise ratio for a peak of 1, decibels; infinite for equal pictures.
     pub psnr: f64,
-    /// Pixels with a channel that differs by more than the threshold.
+    /// Number of pixels with a channel that differs by more than the threshold.
     pub over: u64,
-    /// Pixels compared.
+    /// Number of pixels compared.
     pub pixels: u64,
 }
 

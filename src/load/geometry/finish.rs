@@ -126,7 +126,7 @@ const OF_TANGENTS: u64 = tangents::OF_CORNER + 4 * 16;
 /// Scene with one instance of each mesh, moved to its place in the file. Meshes with smooth normals get tangents later.
 ///
 /// # Errors
-/// When tangents for normal maps would take more than is left of `budget`.
+/// When tangents for normal maps would exceed `budget`.
 fn scene(
     mut meshes: Vec<Mesh>,
     materials: mtl::Materials,

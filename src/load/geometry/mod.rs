@@ -1,9 +1,9 @@
 //! Geometry without a hierarchy -> scene: vertices, faces, points and lines, in runs that share a name and a material.
 //!
-//! It comes from the statements of an OBJ ([`obj`](super::obj)), or is all that files of other formats hold ([`plain_mesh`]).
-//! It is centred in `f64` and rounded ([`place`](super::place)), and becomes one mesh and one instance for each run
-//! (`assemble`); points and lines (`wire_statements`) get a width ([`wires`](super::wires)); materials come from the MTL files
-//! or pictures that it names ([`mtl`](super::mtl), `plain_mesh::pictures`); `finish` runs all these steps.
+//! The geometry comes from the statements of an OBJ ([`obj`](super::obj)), or is all that other formats hold
+//! ([`plain_mesh`]). It is centred in `f64` and rounded ([`place`](super::place)), and becomes one mesh and one instance for
+//! each run (`assemble`); points and lines (`wire_statements`) get a width ([`wires`](super::wires)); materials come from the
+//! MTL files or pictures that it names ([`mtl`](super::mtl), `plain_mesh::pictures`); `finish` runs all these steps.
 
 mod assemble;
 pub(super) mod color;

@@ -11,10 +11,11 @@
 //! | `s x y z r` | sphere |
 //! | `c x y z r x y z r` | cone or cylinder, open at both ends |
 //!
-//! What the text leaves open is decided so: colours are linear; diffuse and ambient colour are the colour times Kd,
+//! What the format leaves open is decided so: colours are linear; diffuse and ambient colour are the colour times Kd,
 //! highlight Ks, mirror the colour times Ks, transmission the colour times T, but no more than the mirror leaves; every
 //! surface is seen from both sides, so the sign of a radius means nothing; n lights and the ambient light are each as
-//! strong as √n / 2n, as the text suggests; rays that leave see the background. Polygons of one material become one mesh.
+//! strong as √n / 2n, as the format's text suggests; rays that leave see the background. Polygons of one material become one
+//! mesh.
 
 mod faces;
 mod words;

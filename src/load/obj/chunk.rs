@@ -32,7 +32,7 @@ pub(super) fn resolve(number: u32, before: u32) -> Option<u32> {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Chunk {
     pub positions: Vec<DVec3>,
-    /// v points up.
+    /// Texture coordinates, v upwards.
     pub uvs: Vec<DVec2>,
     /// Unit normals; zero where they have no direction.
     pub normals: Vec<Vec3>,
@@ -301,7 +301,7 @@ fn plain_index(text: &[u8], at: &mut usize) -> Option<u32> {
     (*at - start <= DIGITS && index > 0).then_some(index)
 }
 
-/// Any line.
+/// All other lines.
 impl Reader {
     fn statement(&mut self, text: &[u8]) {
         let (word, rest) = keyword(text);

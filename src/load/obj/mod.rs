@@ -3,7 +3,7 @@
 //! The text becomes `statements` (lines, numbers, names, faces; every error with its line), which hold the
 //! geometry of the file (`load::geometry`): vertices, faces, points and lines in runs of one object, group and material.
 //!
-//! What the text leaves open is decided so: faces without normals are flat unless a smoothing group says otherwise;
+//! What the format leaves open is decided so: faces without normals are flat unless a smoothing group says otherwise;
 //! vertex colours are sRGB-coded, MTL colours linear; the fourth number of a vertex is a weight for rational curves and
 //! ignored; every surface is seen from both sides; a face whose normals point to its back is flipped.
 

@@ -50,7 +50,7 @@ impl Tally {
 pub(super) struct Oddities {
     pub wire_statements: Tally,
     pub curves: Tally,
-    /// Statements that stand for others.
+    /// Statements that stand for others (`call`, `csh`).
     pub calls: Tally,
     pub few_corners: Tally,
     pub unknown: Tally,
@@ -457,7 +457,7 @@ mod tests {
 
     #[test]
     fn a_line_that_cannot_be_read_after_all_leaves_no_corner() {
-        // The corners that name more than vertices come before the invalid one.
+        // The corner that names more than a vertex comes before what is wrong with the line.
         let s = of(&format!("{TRIANGLE}vt 0 0\nf 1 2 3\nf 3 2 1/1 \\\n1\nf 2 3"));
         assert_eq!(corners(&s), [[1, 0, 0], [2, 0, 0], [3, 0, 0], [3, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0]]);
         assert!(fault(&format!("{TRIANGLE}vt 0 0\nf 1 2 3\nf 1 2 3/1 x")).contains("corner 4 of the face is 'x'"));

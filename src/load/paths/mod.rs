@@ -68,7 +68,7 @@ pub struct Found {
     pub path: PathBuf,
     /// Contents of the file.
     pub bytes: Vec<u8>,
-    /// Whether it lies elsewhere than its name says.
+    /// Whether the file lies elsewhere than its name says.
     pub guessed: bool,
 }
 
@@ -111,7 +111,7 @@ pub enum FileFault {
         name: String,
         /// Size of the file.
         bytes: u64,
-        /// The limit.
+        /// Largest size allowed.
         limit: u64,
         /// Remedy, if there is one.
         remedy: &'static str,

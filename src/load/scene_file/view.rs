@@ -13,7 +13,7 @@ enum Kind {
     Ambient,
 }
 
-/// A light, or a share of the ambient light.
+/// A light, or a contribution to the ambient light.
 pub(super) enum Lit {
     Light(Light),
     Ambient(Vec3),

@@ -105,7 +105,7 @@ struct Paint {
 impl Paint {
     /// Detects either of the two conventions: Materialise Magics writes `COLOR=` and four bytes into the header, the colour
     /// of the whole, and clears the highest bit of triangles with their own colour; VisCAM and SolidView only set the highest bit
-    /// of coloured triangles, and order the channels the other way. `None` where there is no sign of either. MeshLab writes
+    /// of coloured triangles, and order the channels in reverse. `None` where there is no sign of either. MeshLab writes
     /// Magics' sign and sets the bit of all triangles, which have colours of their own nevertheless.
     fn of(header: &[u8], records: &[[u8; TRIANGLE]]) -> Option<Self> {
         const SIGN: &[u8] = b"COLOR=";

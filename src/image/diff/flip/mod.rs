@@ -18,7 +18,7 @@ use rayon::prelude::*;
 /// Pixels per degree of the visual field, for a screen of 3840 columns and 0.7 m, seen from 0.7 m.
 pub const PIXELS_PER_DEGREE: f64 = 3840.0 * std::f64::consts::PI / 180.0;
 
-/// A picture as it is displayed: linear Rec. 709, 0..=1, rows from the top.
+/// A displayed picture: linear Rec. 709, 0..=1, rows from the top.
 #[derive(Clone, Copy, Debug)]
 pub struct Displayed<'a> {
     /// Columns.
