@@ -121,7 +121,7 @@ pub enum MtlMode {
 pub struct Loaded {
     /// The scene.
     pub scene: Scene,
-    /// Differences between the file and what is drawn.
+    /// Warnings about contents that are not drawn as the file specifies.
     pub warnings: Vec<Diagnostic>,
     /// Facts for reports.
     pub facts: Facts,
