@@ -58,10 +58,11 @@ impl<'a> Body<'a> {
         self.words.rest().len() as u64
     }
 
-    /// Warning when bytes follow what the header counts; white space behind a text does not count.
+    /// Warning when bytes follow what the header counts; white space alone does not count.
     pub(super) fn behind(&self) -> Option<Diagnostic> {
         let rest = self.words.rest();
-        let rest = if self.encoding == Encoding::Text { rest.trim_ascii() } else { rest };
+        let is_blank = rest.iter().all(u8::is_ascii_whitespace);
+        let rest = if self.encoding == Encoding::Text || is_blank { rest.trim_ascii() } else { rest };
         (!rest.is_empty()).then(|| {
             let text = format!("{} bytes follow what the header counts", rest.len());
             Diagnostic { code: "ply-bytes-behind", ..self.fault(text, "they are not read") }

@@ -130,10 +130,20 @@ pub(super) fn place(inline: Vec<Inline>, scene: &mut Scene, lost: &mut Lost) -> 
     max_rounding
 }
 
-/// Largest factor by which a transform stretches a line: exact where its axes stay perpendicular, an underestimate elsewhere.
+/// Largest factor by which a transform stretches a line: the largest singular value of its matrix A, the root of the largest
+/// eigenvalue of AᵀA (O. K. Smith, "Eigenvalues of a symmetric 3 × 3 matrix", 1961).
 pub(super) fn stretch(transform: &DAffine3) -> f64 {
-    let DMat3 { x_axis, y_axis, z_axis } = transform.matrix3;
-    x_axis.length().max(y_axis.length()).max(z_axis.length())
+    let squared = transform.matrix3.transpose() * transform.matrix3;
+    let DMat3 { x_axis: x, y_axis: y, z_axis: z } = squared;
+    let mean = (x.x + y.y + z.z) / 3.0;
+    let off = squared - DMat3::from_diagonal(DVec3::splat(mean));
+    let [x, y, z] = [off.x_axis, off.y_axis, off.z_axis];
+    let spread = ((x.length_squared() + y.length_squared() + z.length_squared()) / 6.0).sqrt();
+    if spread == 0.0 {
+        return mean.sqrt();
+    }
+    let half_determinant = (off * (1.0 / spread)).determinant() / 2.0;
+    (mean + 2.0 * spread * libm::cos(libm::acos(half_determinant.clamp(-1.0, 1.0)) / 3.0)).sqrt()
 }
 
 fn index(value: &DeValue) -> Result<u32, String> {
@@ -272,4 +282,34 @@ fn matrix(value: &DeValue) -> Result<DAffine3, String> {
         return Err("must be invertible".into());
     }
     Ok(DAffine3 { matrix3, translation: column(3) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Random;
+
+    #[test]
+    fn a_sheared_place_stretches_by_more_than_its_axes_are_long() {
+        let sheared = DMat3::from_cols(DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Z);
+        let golden = f64::midpoint(1.0, 5.0_f64.sqrt());
+        assert!((stretch(&DAffine3::from_mat3(sheared)) - golden).abs() < 1e-14);
+        for (diagonal, most) in [([1.0; 3], 1.0), ([0.0; 3], 0.0), ([-3.0, 2.0, 1.0], 3.0), ([0.0, 0.0, 5.0], 5.0)] {
+            let turn = DMat3::from_quat(DQuat::from_rotation_x(0.4) * DQuat::from_rotation_z(1.1));
+            let turned = turn * DMat3::from_diagonal(DVec3::from_array(diagonal)) * turn.transpose();
+            assert!((stretch(&DAffine3::from_mat3(turned)) - most).abs() < 1e-7, "{diagonal:?}");
+        }
+    }
+
+    #[test]
+    fn no_line_is_stretched_by_more_and_some_line_by_as_much() {
+        let mut random = Random::new(7);
+        for _ in 0..20 {
+            let matrix = DMat3::from_cols_array(&std::array::from_fn(|_| f64::from(2.0 * random.unit() - 1.0)));
+            let most = stretch(&DAffine3::from_mat3(matrix));
+            let lengths = (0..20_000).map(|_| (matrix * random.direction().as_dvec3().normalize()).length());
+            let found = lengths.fold(0.0, f64::max);
+            assert!(found <= most * (1.0 + 1e-12) && found > 0.995 * most, "{found} of {most}");
+        }
+    }
 }

@@ -395,7 +395,9 @@ fn what_follows_the_elements_is_told_and_a_mark_before_them_is_none() {
         encoded("binary_little_endian", vertex, &[Value::Float(1.0), Value::Float(2.0), Value::Float(3.0)]);
     assert!(!warnings(&binary).iter().any(|w| w.contains("follow")));
     let end = binary.len();
-    binary.push(0);
+    binary.push(b'\n');
+    assert!(!warnings(&binary).iter().any(|w| w.contains("follow")));
+    binary[end] = 0;
     let told = format!("a.ply:byte {end}: 1 bytes follow what the header counts; they are not read");
     assert!(warnings(&binary).contains(&told), "{:?}", warnings(&binary));
 }
