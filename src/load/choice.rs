@@ -65,12 +65,7 @@ pub(super) fn check_animation(facts: &Facts, moment: &Moment, file: &Path) -> Re
 }
 
 /// Refuses a name that several items have; numbers begin with `first`.
-pub(super) fn check_name(
-    kind: &Kind,
-    names: &[&str],
-    (wish, first): (&str, usize),
-    file: &Path,
-) -> Result<(), Diagnostic> {
+pub(super) fn check_name(kind: &Kind, names: &[&str], wish: &str, first: usize, file: &Path) -> Result<(), Diagnostic> {
     let called = (first..).zip(names).filter(|(_, name)| is_called(name, wish));
     let called: Vec<String> = called.map(|(i, _)| i.to_string()).collect();
     if called.len() < 2 {
@@ -86,7 +81,7 @@ pub(super) fn check_name(
 /// # Errors
 /// When there is no such item, with a list of those there are; when several have the name.
 pub(crate) fn choose(kind: &Kind, names: &[&str], wish: &str, file: &Path) -> Result<usize, Diagnostic> {
-    check_name(kind, names, (wish, 0), file)?;
+    check_name(kind, names, wish, 0, file)?;
     find(names, wish, 0).ok_or_else(|| {
         let text = format!("there is no {} '{wish}'", kind.word);
         Diagnostic::new(kind.code, file, kind.list, text).remedy(instead(kind, names, wish))
@@ -116,7 +111,7 @@ mod tests {
 
     #[test]
     fn what_shares_a_name_is_told_by_numbers_that_count_the_models_before() {
-        let check = |wish: &str| check_name(&ANIMATION, &["Run", "Stay", "Run"], (wish, 3), Path::new("b.glb"));
+        let check = |wish: &str| check_name(&ANIMATION, &["Run", "Stay", "Run"], wish, 3, Path::new("b.glb"));
         let error = check("Run").unwrap_err().to_string();
         assert_eq!(error, "b.glb:animations: 2 animations are called 'Run'; name one by its number: 3, 5");
         assert!(check("Stay").is_ok() && check("Fly").is_ok());

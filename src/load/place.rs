@@ -73,7 +73,8 @@ impl LeftOut {
     pub(super) fn tell(
         &self,
         count: u64,
-        (file, place): (&Path, String),
+        file: &Path,
+        place: String,
         dropped: &mut Vec<(String, u64)>,
         warnings: &mut Warnings,
     ) {

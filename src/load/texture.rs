@@ -176,7 +176,7 @@ fn check_size(image: &Encoded, limits: &Limits, budget: &mut Budget) -> Result<K
     let bytes = image.bytes.as_ref();
     if ktx::is(bytes) {
         let ktx::Size { width, height, between } = ktx::size(bytes)?;
-        take_memory(width, height, (4, between), limits, budget)?;
+        take_memory(width, height, 4, between, limits, budget)?;
         return Ok(Kind::Ktx);
     }
     let format = format_of(&image.name, bytes).ok_or_else(|| unknown_kind(bytes))?;
@@ -195,7 +195,7 @@ fn check_size(image: &Encoded, limits: &Limits, budget: &mut Budget) -> Result<K
     };
     // A TGA of 16 bits or with a palette is unpacked from a copy.
     beside += if format == ImageFormat::Tga { 2 * u64::from(width) * u64::from(height) } else { 0 };
-    take_memory(width, height, (texel, beside), limits, budget)?;
+    take_memory(width, height, texel, beside, limits, budget)?;
     Ok(Kind::Image { format, bytes: decoder.total_bytes().saturating_add(BESIDE.min(budget.left())) })
 }
 
@@ -208,7 +208,8 @@ pub(super) fn smaller_copies(pixels: u64) -> u64 {
 pub(super) fn take_memory(
     width: u32,
     height: u32,
-    (texel, more): (u64, u64),
+    texel: u64,
+    more: u64,
     limits: &Limits,
     budget: &mut Budget,
 ) -> Result<(), Unusable> {

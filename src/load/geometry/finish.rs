@@ -37,7 +37,8 @@ pub(in crate::load) struct Kind<'a> {
 pub(in crate::load) fn finish(
     mut geometry: Geometry,
     kind: &Kind,
-    (source, options): (&Source, &LoadOptions),
+    source: &Source,
+    options: &LoadOptions,
     mut warnings: Warnings,
     budget: &mut Budget,
 ) -> Result<Loaded, LoadError> {
@@ -79,9 +80,8 @@ pub(in crate::load) fn finish(
     let of_wires = materials.of_name.get(meshes.len()..).unwrap_or_default();
     wires.iter_mut().zip(of_wires).for_each(|(wires, &material)| wires.mesh.material = material);
     let up = options.up.unwrap_or(guessed);
-    let how = (up, options.smooth.is_some());
-    let mut scene =
-        scene(meshes, materials, placed.center, how, budget).map_err(|over| Diagnostic::over_budget(file, over))?;
+    let mut scene = scene(meshes, materials, placed.center, up, options.smooth.is_some(), budget)
+        .map_err(|over| Diagnostic::over_budget(file, over))?;
 
     let (files, hash, gaps) = resolver.finish();
     let mut facts = Facts {
@@ -131,7 +131,8 @@ fn scene(
     mut meshes: Vec<Mesh>,
     materials: mtl::Materials,
     center: DVec3,
-    (up, smooths): (UpAxis, bool),
+    up: UpAxis,
+    smooths: bool,
     budget: &mut Budget,
 ) -> Result<Scene, OverBudget> {
     let mtl::Materials { materials, textures, bitmaps, of_name, .. } = materials;

@@ -112,7 +112,7 @@ fn charge(bitmap: &Bitmap, limits: &Limits, budget: &mut Budget) -> Result<(), U
         Pixels::Rgba8(_) => 4,
         Pixels::Rgba16(_) => 8,
     };
-    take_memory(bitmap.width, bitmap.height, (bytes, 0), limits, budget)
+    take_memory(bitmap.width, bitmap.height, bytes, 0, limits, budget)
 }
 
 /// Where the bytes of one image are looked for.

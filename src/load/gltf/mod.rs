@@ -244,7 +244,7 @@ impl Loading<'_> {
         let number = match (&moment.animation, self.options.animations_before) {
             (Some(wish), None) => choice::choose(&choice::ANIMATION, &names, wish, file)?,
             (Some(wish), Some(before)) => {
-                choice::check_name(&choice::ANIMATION, &names, (wish, before), file)?;
+                choice::check_name(&choice::ANIMATION, &names, wish, before, file)?;
                 match choice::find(&names, wish, before) {
                     Some(number) => number,
                     None => return Ok(Pose::default()),

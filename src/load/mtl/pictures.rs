@@ -72,7 +72,7 @@ impl Pictures {
             return Ok(known);
         }
         if let Some(((width, height), texel)) = self.size(take) {
-            take_memory(width, height, (texel, 0), limits, budget)?;
+            take_memory(width, height, texel, 0, limits, budget)?;
         }
         let made = match take {
             Take::Whole(i) => Made::Source(i),

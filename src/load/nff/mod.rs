@@ -70,7 +70,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
         dropped.push(("without extent".into(), flat));
     }
     for (why, count) in [(&LeftOut::TOO_FAR, far), (&LeftOut::COLLAPSED, drawn.collapsed)] {
-        why.tell(count, (&source.path, String::new()), &mut dropped, &mut warnings);
+        why.tell(count, &source.path, String::new(), &mut dropped, &mut warnings);
     }
     finish(&mut scene, options);
     let (files, hash, _) = Resolver::new(source, options).finish();

@@ -40,7 +40,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
         otherwise: up::UNSAID,
         materials: mtl::load,
     };
-    finish(statements.geometry, &kind, (source, options), warnings, budget)
+    finish(statements.geometry, &kind, source, options, warnings, budget)
 }
 
 #[cfg(test)]

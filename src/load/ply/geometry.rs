@@ -263,7 +263,7 @@ impl Reader<'_, '_> {
                         let value = self.value(element, i, property)?;
                         edge[end] = self.index(value, end as u64, element, i)?;
                     }
-                    Use::Light(part) => self.light(element, i, property, (part, &mut color))?,
+                    Use::Light(part) => self.light(element, i, property, part, &mut color)?,
                     _ => self.pass_property(element, i, property)?,
                 }
             }
@@ -293,7 +293,7 @@ impl Reader<'_, '_> {
                     Use::Corners => self.corners(element, i, property, strips, &mut row.corners)?,
                     Use::Uvs => self.uvs(element, i, property, &mut row.uvs)?,
                     Use::Picture => row.picture = Some(self.value(element, i, property)?),
-                    Use::Light(part) => self.light(element, i, property, (part, &mut row.color))?,
+                    Use::Light(part) => self.light(element, i, property, part, &mut row.color)?,
                     Use::End(_) | Use::Nothing => self.pass_property(element, i, property)?,
                 }
             }
@@ -369,7 +369,8 @@ impl Reader<'_, '_> {
         element: &Element,
         i: u64,
         property: &Property,
-        (part, color): (usize, &mut Option<[f32; 4]>),
+        part: usize,
+        color: &mut Option<[f32; 4]>,
     ) -> Result<(), Diagnostic> {
         let value = Light::said_by(property).part(self.value(element, i, property)?);
         color.get_or_insert([1.0; 4])[part] = value as f32;

@@ -183,14 +183,14 @@ impl Assembly<'_> {
         let named = resolver.as_named(Path::new(&model.file));
         // Files beside the target of a link do not lie beside the link.
         let beside = named.parent().filter(|_| resolver.lies_beside(&named, &path));
-        loaded.facts.files.iter_mut().for_each(|file| file.path = as_named(&file.path, &path, (&named, beside)));
+        loaded.facts.files.iter_mut().for_each(|file| file.path = as_named(&file.path, &path, &named, beside));
         Ok(loaded)
     }
 }
 
 /// Path, as named, of a `file` read for the model at path `model`, which was named `named`: relative to `named` if the file is
 /// the model or inside it (an archive), or relative to the folder `beside` if it lies in the model's folder.
-fn as_named(file: &Path, model: &Path, (named, beside): (&Path, Option<&Path>)) -> PathBuf {
+fn as_named(file: &Path, model: &Path, named: &Path, beside: Option<&Path>) -> PathBuf {
     let way = file.strip_prefix(model);
     if let Ok(way) = way {
         return if way.as_os_str().is_empty() { named.into() } else { named.join(way) };

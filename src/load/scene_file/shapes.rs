@@ -24,7 +24,7 @@ impl Lost {
     /// Reports the counts in the facts and as warnings.
     pub(super) fn tell(self, faults: &Faults, file: &Path, facts: &mut Facts, warnings: &mut Warnings) {
         for (why, (count, at)) in [(&LeftOut::TOO_FAR, self.far), (&LeftOut::COLLAPSED, self.collapsed)] {
-            why.tell(count, (file, faults.place(at)), &mut facts.dropped, warnings);
+            why.tell(count, file, faults.place(at), &mut facts.dropped, warnings);
         }
     }
 

@@ -201,7 +201,7 @@ pub(in crate::load) fn load(
         materials: pictures::load,
     };
     let geometry = geometry(bare, file, &mut warnings);
-    let mut loaded = finish(geometry, &kind, (source, options), warnings, budget)?;
+    let mut loaded = finish(geometry, &kind, source, options, warnings, budget)?;
     let told = pictures::leave_out_colors(&mut loaded, file);
     loaded.warnings.extend(told);
     Ok(loaded)
