@@ -1,4 +1,4 @@
-//! Which quadrants are worth a closer look.
+//! Decides which quadrants are worth splitting.
 
 use crate::image::Developer;
 use crate::math::Vec3;
@@ -7,10 +7,10 @@ use crate::render::frame::Frame;
 use crate::render::sampling::{Adaptive, Split};
 use crate::render::whitted::Sample;
 
-/// Linear light over the background, and the share of a missing one: the numbers that are compared.
+/// Colour to compare: linear light over the background, and the transparent share where there is no background.
 pub(super) type Color = [f32; 4];
 
-/// What the colours of points lie between, channel by channel.
+/// Range of the colours of points, channel by channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Span {
     least: Color,
@@ -18,7 +18,7 @@ pub(super) struct Span {
 }
 
 impl Span {
-    /// Of no points.
+    /// Range of no points.
     pub(super) const NOTHING: Self = Self { least: [f32::INFINITY; 4], most: [f32::NEG_INFINITY; 4] };
 
     pub(super) fn add(&mut self, color: Color) {
@@ -29,13 +29,13 @@ impl Span {
     }
 }
 
-/// The judge of all quadrants of a picture.
+/// Judges all quadrants of a picture.
 pub(super) struct Judge {
     split: Split,
     threshold: f32,
-    /// Of linear light, by the exposure.
+    /// Factor that the exposure applies to linear light.
     gain: f32,
-    /// `None`: errors are counted in linear light.
+    /// Display curve; `None`: errors are measured in linear light.
     curve: Option<Curve>,
     background: Option<Vec3>,
 }
@@ -47,32 +47,34 @@ impl Judge {
         Self { split: how.split, threshold: how.threshold, gain, curve, background: frame.background }
     }
 
-    /// Linear light over the background; without one its share is seen in the picture's alpha.
+    /// Linear light over the background; without one, the transparent share takes the fourth channel, as it shows in the
+    /// picture's alpha.
     pub(super) fn color(&self, sample: &Sample) -> Color {
         let color = sample.radiance + sample.through * self.background.unwrap_or(Vec3::ZERO);
         let clear = if self.background.is_some() { 0.0 } else { sample.through.element_sum() / 3.0 };
         color.extend(clear).to_array()
     }
 
-    /// Whether the points of a pixel's quadrant that were traced decide about it, or only its corner and the pixel's middle.
+    /// Whether all traced points of a quadrant decide about splitting it, or only its corner and the middle.
     pub(super) fn looks_at_all(&self) -> bool {
         self.split == Split::Effect
     }
 
-    /// Whether a corner differs from the middle, linear light after exposure.
+    /// Whether a corner differs from the middle by more than the threshold, in linear light after exposure.
     pub(super) fn differs(&self, corner: Color, middle: Color) -> bool {
         let gain = |c: usize| if c < 3 { self.gain } else { 1.0 };
         (0..4).any(|c| (corner[c] - middle[c]).abs() * gain(c) > self.threshold)
     }
 
-    /// Whether a pixel of one colour has to be looked at anew when it turns out to be of another.
+    /// Whether a pixel's colour has changed so much since it was judged that all its quadrants have to be judged again.
     pub(super) fn is_other(&self, looked: Color, now: Color) -> bool {
-        /// Part by which a channel may change: the slope of the display's curve changes less.
+        /// Fraction by which a channel may change: the slope of the display's curve changes less.
         const PART: f32 = 0.25;
         (0..4).any(|c| (looked[c] - now[c]).abs() > PART * looked[c].abs().min(now[c].abs()))
     }
 
-    /// Whether a pixel of this colour would be written much differently, were that `share` of it anywhere in the span.
+    /// Whether the written pixel of this colour would change by more than the threshold if `share` of it took any colour of the
+    /// span.
     pub(super) fn matters(&self, pixel: Color, span: &Span, share: f32) -> bool {
         (0..4).any(|c| {
             let reach = 0.5 * share * (span.most[c] - span.least[c]);
@@ -86,15 +88,15 @@ impl Judge {
     }
 }
 
-/// How grey of some linear light is written: straight between values that are an even ratio apart in every doubling.
+/// Codes of greys of linear light, interpolated linearly in a table with evenly spaced ratios in every doubling.
 struct Curve {
     codes: Vec<f32>,
 }
 
 impl Curve {
-    /// The darkest and the brightest value of the table, as powers of two.
+    /// Exponents (biased) of the darkest and the brightest value of the table.
     const ENDS: std::ops::Range<u32> = 127 - 14..127 + 12;
-    /// Bits of the fraction of a number within a step of the table: 32 steps a doubling.
+    /// Mantissa bits within one step of the table: 32 steps a doubling.
     const WITHIN: u32 = 23 - 5;
 
     fn new(developer: &Developer) -> Self {
@@ -103,7 +105,7 @@ impl Curve {
         Self { codes: values.map(|step| code(f32::from_bits(step << Self::WITHIN))).collect() }
     }
 
-    /// The code, 0…1, of linear light before exposure.
+    /// Code, 0…1, of linear light before exposure.
     #[expect(clippy::cast_precision_loss, reason = "18 bits")]
     fn code(&self, value: f32) -> f32 {
         let darkest = f32::from_bits(Self::ENDS.start << 23);

@@ -1,4 +1,4 @@
-//! The lattice of points that all pixels share, and what was found at those of one tile.
+//! The lattice of points that all pixels share, and the samples of one tile's points.
 
 use crate::render::frame::{Frame, on_lens, pixel_key};
 use crate::render::layers::FirstSurface;
@@ -8,17 +8,17 @@ use crate::render::whitted::Sample;
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-/// A point: steps from the picture's upper left corner.
+/// Lattice coordinates of a point: steps from the picture's upper left corner.
 pub(super) type Step = (u32, u32);
 
-/// A point, and its number in a tile.
+/// A point, with its index in a tile.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
     pub at: Step,
     pub number: u32,
 }
 
-/// What the ray of a point has found.
+/// The sample of a point's ray.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
     pub at: Step,
@@ -30,13 +30,13 @@ pub(super) struct Found {
 pub(super) struct Lattice {
     /// Steps in a pixel.
     pub pixel: u32,
-    /// Of all points but the middles of squares, which no other square has.
+    /// Indices of all points but the middles of squares, which no other square shares.
     numbers: HashMap<Step, u32, BuildHasherDefault<Spread>>,
-    /// `None`: not traced yet.
+    /// Sample of each point; `None`: not traced yet.
     samples: Vec<Option<Sample>>,
-    /// Empty unless layers are wanted.
+    /// First surface at each point; empty unless layers are wanted.
     firsts: Vec<FirstSurface>,
-    /// Points that nobody has asked for before.
+    /// Points to trace: asked for, but not yet traced.
     pub wanted: Vec<Point>,
 }
 
@@ -45,7 +45,7 @@ impl Lattice {
         Self { pixel, numbers: HashMap::default(), samples: Vec::new(), firsts: Vec::new(), wanted: Vec::new() }
     }
 
-    /// The number of a point, which is wanted if it has none yet.
+    /// Index of a point, which is added to the wanted ones if it is new.
     pub(super) fn point(&mut self, at: Step) -> u32 {
         let next = self.next();
         let number = self.number(at);
@@ -55,7 +55,7 @@ impl Lattice {
         number
     }
 
-    /// The number of the middle of a new square, which is wanted.
+    /// Index of the middle of a new square, which is added to the wanted points.
     pub(super) fn middle(&mut self, at: Step) -> u32 {
         let number = self.next();
         self.samples.push(None);
@@ -63,7 +63,7 @@ impl Lattice {
         number
     }
 
-    /// The number of a point that others may have, too.
+    /// Index of a point that other squares may share, assigned if it is new.
     pub(super) fn number(&mut self, at: Step) -> u32 {
         let next = self.next();
         let number = *self.numbers.entry(at).or_insert(next);
@@ -78,22 +78,22 @@ impl Lattice {
         self.samples.len() as u32
     }
 
-    /// What was found at a point with this number.
+    /// Sample of the point with this index; `None`: not traced yet.
     pub(super) fn sample(&self, number: u32) -> Option<&Sample> {
         self.samples[number as usize].as_ref()
     }
 
-    /// The first surface there, where layers are wanted.
+    /// First surface at the point, where layers are wanted.
     pub(super) fn first(&self, number: u32) -> FirstSurface {
         self.firsts.get(number as usize).copied().unwrap_or(FirstSurface::NONE)
     }
 
-    /// The number of a point that was traced, the middle of no square.
+    /// Index of a traced point that is not the middle of a square.
     fn traced(&self, at: Step) -> Option<u32> {
         self.numbers.get(&at).copied().filter(|&number| self.sample(number).is_some())
     }
 
-    /// Keeps what was found at a point with this number.
+    /// Stores the sample of the point with this index.
     pub(super) fn store(&mut self, number: u32, sample: Sample, first: Option<FirstSurface>) {
         self.samples[number as usize] = Some(sample);
         if let Some(first) = first {
@@ -102,20 +102,20 @@ impl Lattice {
         }
     }
 
-    /// What was found at a point, the middle of no square.
+    /// Sample at a traced point that is not the middle of a square.
     pub(super) fn found(&self, at: Step) -> Option<Found> {
         let number = self.traced(at)?;
         self.sample(number).map(|&sample| Found { at, sample, first: self.first(number) })
     }
 
-    /// What was found in the row of points `y`.
+    /// Samples in lattice row `y`.
     pub(super) fn row(&self, y: u32) -> impl Iterator<Item = Found> {
         self.numbers.keys().filter(move |&&(_, row)| row == y).filter_map(|&at| self.found(at))
     }
 
-    /// Numbers of the traced points on the border of a square, its corners not among them.
+    /// Visits the traced points on the border of a square, except its corners.
     ///
-    /// Where the middle of an edge was not traced, nothing on that edge was: squares get smaller by halves.
+    /// Where the middle of an edge was not traced, no point of that edge was: squares get smaller by halves.
     pub(super) fn on_border(&self, (x, y): Step, side: u32, each: &mut impl FnMut(Step, u32)) {
         let ends = [((x, y), (1, 0)), ((x, y + side), (1, 0)), ((x, y), (0, 1)), ((x + side, y), (0, 1))];
         for (at, along) in ends {
@@ -135,9 +135,9 @@ impl Lattice {
         }
     }
 
-    /// The place of a point in the picture, exactly; a ray depends on nothing else.
+    /// Position of a point in the picture, exact; its ray depends on nothing else.
     pub(super) fn place(frame: &Frame, pixel: u32, (x, y): Step) -> CameraSample {
-        /// Steps in a pixel that no lattice exceeds.
+        /// Upper bound of the steps in a pixel of any lattice.
         const FINEST: u32 = 2 << Adaptive::MAX_LEVELS;
         let finest = |steps: u32| steps.wrapping_mul(FINEST / pixel);
         let key = pixel_key(frame.settings.seed, (finest(x), finest(y)));
@@ -146,7 +146,7 @@ impl Lattice {
     }
 }
 
-/// Hashes points for a table: they are our own, so that no attacker can aim at collisions.
+/// Hashes points for a table: the keys are our own, so that no attacker can aim at collisions.
 #[derive(Default)]
 struct Spread(u64);
 

@@ -1,15 +1,14 @@
-//! Adaptive sampling: five rays in a square, and smaller squares in those of its quadrants where it matters.
+//! Adaptive sampling: five rays in a square, and smaller squares in the quadrants where they matter.
 //!
-//! A pixel is ¼ of the sum over its corners X of (X + E)/2, E being its middle; a quadrant that is worth it ([`judge`]) is
-//! that of a square of its own, whose corners are X, E and the middles of two edges: at most three new rays, and fewer
-//! where a neighbour has traced a middle. Points lie on a lattice that all pixels share, and a ray depends on nothing but
-//! its point.
+//! A pixel is ¼ of the sum over its corners X of (X + E)/2, E being its middle. A quadrant that is worth it ([`judge`]) becomes a
+//! square of its own, whose corners are X, E and the middles of two edges: at most three new rays, and fewer where a neighbour
+//! has traced a middle. Points lie on a lattice that all pixels share, and a ray depends on nothing but its point.
 //!
-//! What a ray finds on the border of two squares is known to both, and may tell the other that it has overlooked something;
-//! so it may come that a whole row of pixels looks closer, one after the other. Tiles therefore take turns: all of them look
-//! at what was found, then all trace what they want to know more of, each point by the one tile that owns it, and then they
-//! tell their neighbours. To bound the memory that is done for a band of tiles at a time; what it has found on its
-//! lower border is known to the next.
+//! A sample on the border of two squares is shared by both, and may show the other that it has missed a detail; refinement may
+//! therefore run along a whole row of pixels, one after the other. So tiles work in rounds: all tiles judge their samples, then
+//! all trace the points they want next, each point by the one tile that owns it, and then pass border samples to their
+//! neighbours. To bound memory, this is done for one band of tiles at a time; the samples on its lower border are handed to the
+//! next band.
 
 mod judge;
 mod lattice;
@@ -30,10 +29,10 @@ use plot::Plot;
 use rayon::prelude::*;
 use std::sync::Mutex;
 
-/// Tiles of a band at least, but for the last: enough for many threads.
+/// Minimum number of tiles in a band (the last may have fewer): enough for many threads.
 const BAND: usize = 64;
 
-/// Pixels of a band in a picture so wide, of which all rays are kept at a time.
+/// Number of pixels in a band of a picture of this width: those whose samples are all kept at the same time.
 #[cfg(feature = "cli")]
 pub(crate) fn pixels_at_a_time(width: u32) -> u64 {
     use super::tile::TILE;
@@ -41,7 +40,7 @@ pub(crate) fn pixels_at_a_time(width: u32) -> u64 {
     u64::from(width) * (BAND as u64).div_ceil(columns) * u64::from(TILE)
 }
 
-/// Renders one tile for itself, with all of its border; `None` when cancelled.
+/// Renders one tile by itself, borders included; `None` when cancelled.
 pub(super) fn render<A: Accel, P: Observer>(
     frame: &Frame,
     how: &Adaptive,
@@ -60,8 +59,8 @@ pub(super) fn render<A: Accel, P: Observer>(
     }
 }
 
-/// Renders all tiles, given row by row, and has each kept that is finished; the counts of all threads, and whether nothing was
-/// cut short.
+/// Renders all tiles, given row by row, and passes each finished one to `keep`; returns the counts of all threads, and whether
+/// the picture is complete.
 pub(super) fn render_all<A: Accel, P: Observer>(
     frame: &Frame,
     how: &Adaptive,
@@ -98,7 +97,7 @@ struct Crew<'a, A: Accel, P> {
 }
 
 impl<A: Accel, P: Observer> Crew<'_, A, P> {
-    /// Renders a band until nothing in it is worth another look; `None` when cancelled.
+    /// Renders a band until no quadrant in it is worth splitting; `None` when cancelled.
     fn finish(&self, band: &mut Band, judge: &Judge) -> Option<()> {
         loop {
             let wanted = band.share();
@@ -107,7 +106,7 @@ impl<A: Accel, P: Observer> Crew<'_, A, P> {
             }
             let work = |(plot, points): (&mut Plot, &Vec<Point>)| {
                 let tracer = &self.tracers[rayon::current_thread_index().unwrap_or(0) % self.tracers.len()];
-                // A thread that has failed leaves its counts behind; what it did not finish is not complete.
+                // A thread that panicked leaves its counts behind; the tile it did not finish counts as incomplete.
                 let mut tracer = tracer.lock().ok()?;
                 plot.trace(self.frame, &mut tracer, points)
             };
@@ -119,14 +118,14 @@ impl<A: Accel, P: Observer> Crew<'_, A, P> {
     }
 }
 
-/// Rows of tiles that take turns.
+/// Rows of tiles that work in rounds.
 struct Band {
     plots: Vec<Plot>,
     /// Tiles in a row.
     columns: usize,
     /// Steps in a tile's side.
     side: u32,
-    /// Where it begins, and where it ends, in steps.
+    /// Rows of the lattice where the band begins and ends, in steps.
     rows: (u32, u32),
 }
 
@@ -139,12 +138,12 @@ impl Band {
             let along = |plot: &&mut Plot| (plot.tile.x0 * pixel..=plot.tile.x1 * pixel).contains(&found.at.0);
             plots[..columns].iter_mut().filter(along).for_each(|plot| plot.take_border_point(found, layers));
         }
-        // The last row may be lower, never the first but alone.
+        // Only the last row may be lower; the first only where it is the only one.
         let side = (first.x1 - first.x0).max(first.y1 - first.y0) * pixel;
         Self { plots, columns, side, rows: (first.y0 * pixel, last.y1 * pixel) }
     }
 
-    /// Plots that have a point inside or on their border; the one that owns it comes last.
+    /// Plots that have a point inside or on their border; the owner comes last.
     fn plots_at(&self, (x, y): Step) -> impl Iterator<Item = usize> + use<> {
         let (side, columns, top) = (self.side, self.columns, self.rows.0);
         let around = move |at: u32, plots: usize| {
@@ -156,7 +155,7 @@ impl Band {
         rows.flat_map(move |row| around(x, columns).map(move |column| row * columns + column))
     }
 
-    /// What each plot is to trace: the points that it owns and that are wanted.
+    /// Points for each plot to trace: those wanted by any plot, by owner, that have no sample yet.
     fn share(&mut self) -> Vec<Vec<Point>> {
         for i in 0..self.plots.len() {
             for point in std::mem::take(&mut self.plots[i].lattice.wanted) {
@@ -176,7 +175,7 @@ impl Band {
         self.plots.iter_mut().map(unknown).collect()
     }
 
-    /// Tells the neighbours of each plot what it has found on its border.
+    /// Passes the samples on the border of each plot to its neighbours.
     fn tell(&mut self, traced: &[Vec<Point>], layers: bool) {
         for (from, points) in traced.iter().enumerate() {
             let pixel = self.plots[from].lattice.pixel;
@@ -194,7 +193,7 @@ impl Band {
         }
     }
 
-    /// What was found on the border to the next band.
+    /// Samples on the border to the next band.
     fn lower_border(&self) -> Vec<Found> {
         let last = &self.plots[self.plots.len() - self.columns..];
         last.iter().flat_map(|plot| plot.lattice.row(self.rows.1)).collect()

@@ -1,4 +1,4 @@
-//! One tile on its way: its pixels as squares, and the squares that some of their quadrants became.
+//! One tile in progress: its pixels as squares, and the squares that some of their quadrants became.
 
 use super::judge::{Color, Judge, Span};
 use super::lattice::{Found, Lattice, Point, Step};
@@ -11,49 +11,49 @@ use crate::render::tile::{End, PixelFacts, TOGETHER, Tile, TilePixels};
 use crate::render::whitted::{Sample, Tracer};
 use std::ops::Range;
 
-/// Where the corners of a square are, in its sides.
+/// Offsets of the corners of a square, in sides.
 const CORNERS: [Step; 4] = [(0, 0), (1, 0), (0, 1), (1, 1)];
 
 /// A pixel, or a quadrant that became a square.
 #[derive(Clone, Copy)]
 struct Square {
-    /// Its upper left corner.
+    /// Upper left corner.
     at: Step,
     side: u32,
-    /// Numbers of points, in the order of [`CORNERS`].
+    /// Indices of the corner points, in the order of [`CORNERS`].
     corners: [u32; 4],
     middle: u32,
     quadrants: [Quadrant; 4],
 }
 
-/// A quarter of a square, with one of its corners.
+/// A quarter of a square, at one of its corners.
 #[derive(Clone, Copy)]
 enum Quadrant {
-    /// The mean of the corner and the middle; so far apart are the points on its border, and whether something was found
-    /// there since it was looked at.
+    /// The mean of the corner and the middle; with the range of the points in it or on its border, and whether one was added
+    /// since it was judged.
     Flat(Span, bool),
-    /// A square of its own, by number.
+    /// Index of the square that the quadrant became.
     Split(u32),
 }
 
-/// A tile on its way.
+/// A tile in progress.
 pub(super) struct Plot {
     pub tile: Tile,
     pub lattice: Lattice,
-    /// The pixels, in the order of the tile's places, and then the others.
+    /// The pixels, in the order of the tile's places, then the squares split off them.
     squares: Vec<Square>,
-    /// The square of each pixel, row by row.
+    /// Index of the square of each pixel, row by row.
     pixels: Vec<u32>,
-    /// The colour of each pixel, in the order of the squares, when all of it was looked at.
+    /// Colour of each pixel, in the order of the squares, when all its quadrants were last judged.
     looked: Vec<Option<Color>>,
-    /// Points that were traced since quadrants were looked at.
+    /// Points traced or received since quadrants were last judged.
     fresh: Vec<Point>,
-    /// Rays that were traced here.
+    /// Number of rays traced here.
     rays: u64,
 }
 
 impl Plot {
-    /// A tile whose points all wait; a lattice has `2 << levels` steps in a pixel.
+    /// Makes a tile none of whose points are traced; the lattice has `2 << levels` steps in a pixel.
     #[expect(clippy::cast_possible_truncation, reason = "a tile has a thousand pixels")]
     pub(super) fn new(tile: Tile, how: &Adaptive) -> Self {
         let (levels, least) = (how.levels.min(Adaptive::MAX_LEVELS), how.min_levels.min(how.levels));
@@ -78,7 +78,7 @@ impl Plot {
         ((y - self.tile.y0) * (self.tile.x1 - self.tile.x0) + x - self.tile.x0) as usize
     }
 
-    /// Splits a square and all of its quadrants so many times.
+    /// Splits a square and all of its quadrants, `times` levels deep.
     fn quarter(&mut self, i: usize, times: u32) {
         for quadrant in 0..if times > 0 { 4 } else { 0 } {
             let new = self.split(i, quadrant);
@@ -86,12 +86,12 @@ impl Plot {
         }
     }
 
-    /// Numbers of the corners of a square.
+    /// Indices of the corners of a square.
     fn corners(&mut self, (x, y): Step, side: u32) -> [u32; 4] {
         CORNERS.map(|(right, down)| self.lattice.point((x + right * side, y + down * side)))
     }
 
-    /// A new square.
+    /// Adds a square, and returns its index.
     fn square(&mut self, (x, y): Step, side: u32, corners: [u32; 4]) -> usize {
         let middle = self.lattice.middle((x + side / 2, y + side / 2));
         let quadrants = [Quadrant::Flat(Span::NOTHING, false); 4];
@@ -99,7 +99,7 @@ impl Plot {
         self.squares.len() - 1
     }
 
-    /// Makes a quadrant a square. Of its corners one is the old square's, and the one across the old middle.
+    /// Splits a quadrant off as a square. One of its corners is the old square's, the opposite one the old middle.
     #[expect(clippy::cast_possible_truncation, reason = "a tile has a thousand pixels")]
     fn split(&mut self, i: usize, quadrant: usize) -> usize {
         let Square { at: (x, y), side, corners: old, middle, .. } = self.squares[i];
@@ -115,7 +115,7 @@ impl Plot {
         new
     }
 
-    /// Traces these points.
+    /// Traces these points; `None` when cancelled.
     pub(super) fn trace<A: Accel, P: Observer>(
         &mut self,
         frame: &Frame,
@@ -139,14 +139,14 @@ impl Plot {
         Some(())
     }
 
-    /// Takes what was found at a point of the border of this tile.
+    /// Takes over a sample on the border of this tile.
     pub(super) fn take_border_point(&mut self, found: &Found, layers: bool) {
         let number = self.lattice.number(found.at);
         self.lattice.store(number, found.sample, layers.then_some(found.first));
         self.fresh.push(Point { at: found.at, number });
     }
 
-    /// Looks at every pixel of which something was found since the last time, and splits quadrants of them.
+    /// Judges every pixel that has new samples, and splits those of its quadrants that are worth it.
     pub(super) fn look(&mut self, judge: &Judge) {
         let mut touched = vec![false; self.pixels.len()];
         for Point { at, number } in std::mem::take(&mut self.fresh) {
@@ -163,7 +163,7 @@ impl Plot {
         for pixel in (0..touched.len()).filter(|&pixel| touched[pixel]) {
             let Sum { radiance, through, .. } = self.sum(pixel);
             let color = judge.color(&Sample { radiance, through });
-            // What was not worth a look may be when the pixel has turned out to be darker.
+            // A quadrant not worth splitting before may be so in a pixel that has turned out darker.
             let is_other = self.looked[pixel].is_none_or(|looked| judge.is_other(looked, color));
             let all = is_other || !judge.looks_at_all();
             if all {
@@ -177,7 +177,7 @@ impl Plot {
         self.lattice.sample(number).map(|sample| judge.color(sample))
     }
 
-    /// Columns and rows of the pixels in or on whose border a point is.
+    /// Columns and rows of the pixels that contain a point or touch it.
     fn pixels_at(&self, (x, y): Step) -> (Range<u32>, Range<u32>) {
         let (side, tile) = (self.lattice.pixel, self.tile);
         let beside = |at: u32, from: u32, to: u32| {
@@ -187,7 +187,7 @@ impl Plot {
         (beside(x, tile.x0, tile.x1), beside(y, tile.y0, tile.y1))
     }
 
-    /// Tells the quadrants in or on whose border a point is of its colour.
+    /// Adds the colour at a point to the quadrants that contain or touch it.
     fn reach(&mut self, i: usize, at: Step, color: Color) {
         let Square { at: (x, y), side, .. } = self.squares[i];
         let half = side / 2;
@@ -206,8 +206,8 @@ impl Plot {
         }
     }
 
-    /// Splits those quadrants of a pixel of this colour, and of the squares in it, that are worth it: `all` of them, or those
-    /// of which something was found.
+    /// Splits the quadrants of a pixel, and of the squares in it, that are worth it given the pixel's colour: judges `all` of
+    /// them, or only those with new samples.
     fn refine(&mut self, judge: &Judge, i: usize, pixel: Color, all: bool) {
         let square = self.squares[i];
         for (quadrant, state) in square.quadrants.into_iter().enumerate() {
@@ -230,7 +230,7 @@ impl Plot {
 
     #[expect(clippy::cast_precision_loss, reason = "a few hundred steps")]
     fn is_split(&self, judge: &Judge, square: &Square, quadrant: usize, span: &Span, pixel: Color) -> bool {
-        // A square of the last level has sides of two steps.
+        // Squares of the last level have sides of two steps.
         if square.side <= 2 {
             return false;
         }
@@ -244,7 +244,7 @@ impl Plot {
         }
     }
 
-    /// Tells a new square of what neighbours have found on its border.
+    /// Adds the samples that neighbours have on its border to a new square.
     fn look_back(&mut self, judge: &Judge, i: usize) {
         let Square { at: (x, y), side, corners, .. } = self.squares[i];
         let mut known = Vec::new();
@@ -258,7 +258,7 @@ impl Plot {
         known.into_iter().for_each(|(at, color)| self.reach(i, at, color));
     }
 
-    /// A square's colour: ¼ of the sum over its corners X of (X + E)/2, or of what their quadrants became.
+    /// Colour of a square: ¼ of the sum over its corners X of (X + E)/2, with split quadrants replaced by their squares.
     fn sum(&self, i: usize) -> Sum {
         let square = &self.squares[i];
         let point = |number: u32| {
@@ -277,7 +277,7 @@ impl Plot {
         color
     }
 
-    /// The points of a square and of all squares in it.
+    /// Collects the points of a square and of all squares in it.
     fn points(&self, i: usize, points: &mut Vec<u32>) {
         let square = &self.squares[i];
         points.push(square.middle);
@@ -289,7 +289,7 @@ impl Plot {
         }
     }
 
-    /// The pixels of the tile. Layers come of the five rays that every pixel has, the middle first.
+    /// Gathers the pixels of the tile. Layers come from the five rays that every pixel has, the middle first.
     pub(super) fn gather(&self, frame: &Frame) -> TilePixels {
         let mut done = TilePixels { rays: self.rays, ..TilePixels::empty(self.tile) };
         let mut points = Vec::new();

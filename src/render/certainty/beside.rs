@@ -1,7 +1,7 @@
-//! What the samples of many pixels show, side by side: one number of all pixels, then the next.
+//! Evaluates the samples of many pixels side by side, as columns (structure of arrays).
 //!
-//! The formulas of `frame` and of the developer are called in loops over pixels, of which the compiler makes lanes. So a
-//! pixel has the same bits beside any others, on every instruction set.
+//! The formulas of `frame` and of the developer are called in loops over pixels, which the compiler vectorises. So a pixel has
+//! the same bits whatever its neighbours, on every instruction set.
 
 use super::{Certainty, GROUPS, Range, Seen, Shown};
 use crate::math::simd::{Kernel, LANES, Simd};
@@ -9,13 +9,13 @@ use crate::math::{Vec3, Vec4};
 use crate::render::frame::Sum;
 use crate::render::whitted::Sample;
 
-/// Pixels that are looked at together.
+/// Number of pixels evaluated together.
 const PIXELS: usize = 16;
 
-/// A number of every pixel.
+/// One value of every pixel.
 type Row = [f32; PIXELS];
 
-/// The written numbers of every pixel, RGB and alpha.
+/// Written values of every pixel, RGB and alpha.
 type Rows = [Row; 4];
 
 /// Pixels of a picture.
@@ -27,7 +27,7 @@ pub(in crate::render) struct Pixels {
     pub veil: Vec<[f32; 4]>,
 }
 
-/// One group of samples of every pixel.
+/// One group of samples of every pixel, as columns.
 #[derive(Clone, Copy)]
 struct Sums {
     radiance: [Row; 3],
@@ -49,7 +49,7 @@ impl Sums {
         Sum { radiance, through, solid: self.solid[i], weight: self.weight[i] }
     }
 
-    /// Takes a sample for every pixel; the last of them for those that are not there.
+    /// Loads one sample for every pixel; lanes past the end repeat the last one.
     #[inline(always)]
     fn take<S: Simd>(&mut self, s: S, samples: &[Sample]) {
         for k in 0..PIXELS / LANES {
@@ -78,18 +78,18 @@ impl Sums {
     }
 }
 
-/// Pixels that wait to be looked at together.
+/// Pixels that wait to be evaluated together.
 struct Beside<'g> {
     sums: [Sums; GROUPS],
-    /// The groups of the last of them.
+    /// Groups of the last pixel.
     last: &'g [Sum],
     pixels: usize,
-    /// How many pixels that follow each other are alike.
+    /// Run length of identical consecutive pixels, by lane.
     alike: [u32; PIXELS],
     seen: Found,
 }
 
-/// What is found out about them.
+/// Results of the evaluation, by lane.
 struct Found {
     color: Rows,
     least: Rows,
@@ -99,13 +99,14 @@ struct Found {
 }
 
 impl Certainty<'_> {
-    /// Tells what groups of samples of each of these pixels show: as many groups of every pixel, [`GROUPS`] at most.
+    /// Passes what the sample groups of each of these pixels show to `tell`: all pixels have the same number of groups, at most
+    /// [`GROUPS`].
     pub(in crate::render) fn see_each<'g>(&self, pixels: impl Iterator<Item = &'g [Sum]>, mut tell: impl FnMut(&Seen)) {
         self.look_at_each(pixels, true, |found, i| tell(&found.at(i)));
     }
 
-    /// Tells the standard error of each of these pixels, the root of the mean over its channels, from groups of equally many
-    /// samples: as many groups of every pixel, [`GROUPS`] at most.
+    /// Passes the standard error of each of these pixels, the root of the mean over its channels, to `tell`: from groups of
+    /// equally many samples, the same number for all pixels, at most [`GROUPS`].
     pub(in crate::render) fn each_standard_error<'g>(
         &self,
         pixels: impl Iterator<Item = &'g [Sum]>,
@@ -114,7 +115,7 @@ impl Certainty<'_> {
         self.look_at_each(pixels, false, |found, i| tell(found.error[i]));
     }
 
-    /// What each of these single samples shows, and makes of its pixel where it is the only one.
+    /// Evaluates each single sample: what it shows, and the pixel that it makes where it is the only one.
     pub(in crate::render) fn see_samples(&self, samples: &[Sample]) -> (Shown, Pixels) {
         let (mut shown, mut pixels) = (Shown::with_capacity(samples.len()), Pixels::default());
         pixels.beauty.reserve(samples.len());
@@ -146,14 +147,14 @@ impl<'g> Beside<'g> {
         Self { sums: [Sums::EMPTY; GROUPS], last: &[], pixels: 0, alike: [0; PIXELS], seen }
     }
 
-    /// Whether those that wait must be looked at before a pixel with these groups.
+    /// Whether the waiting pixels must be evaluated before a pixel with these groups is added.
     fn is_full_for(&self, groups: &[Sum]) -> bool {
         self.pixels == PIXELS && self.last != groups
     }
 
     fn take(&mut self, groups: &'g [Sum]) {
         debug_assert!(self.pixels == 0 || self.last.len() == groups.len());
-        // Large parts of a picture are one colour.
+        // Large parts of a picture have one colour.
         if self.pixels == 0 || self.last != groups {
             for (sums, group) in self.sums.iter_mut().zip(groups) {
                 sums.set(self.pixels % PIXELS, *group);
@@ -165,7 +166,7 @@ impl<'g> Beside<'g> {
         self.alike[self.pixels - 1] += 1;
     }
 
-    /// Looks at all that wait, and tells what each has shown.
+    /// Evaluates all waiting pixels, and passes the result of each to `tell`.
     fn look(&mut self, judge: &Certainty, range: bool, mut tell: impl FnMut(&Found, usize)) {
         let (sums, to) = (&self.sums[..self.last.len().min(GROUPS)], &mut self.seen);
         if range {
@@ -188,7 +189,7 @@ impl Found {
     }
 }
 
-/// All that samples show.
+/// Kernel that evaluates all results.
 struct See<'a, 'j> {
     judge: &'a Certainty<'j>,
     sums: &'a [Sums],
@@ -198,7 +199,7 @@ struct See<'a, 'j> {
 impl Kernel for See<'_, '_> {
     type Output = ();
 
-    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
+    // The lanes are plain arrays: the token `S` only tells which instructions the compiler may use.
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
         let Self { judge, sums, to } = self;
@@ -227,14 +228,14 @@ impl Kernel for See<'_, '_> {
         mean(left, &mut to.color);
         let equal = equal(sums);
         judge.spread(left, &equal, &mut to.error);
-        // What is the same in all groups has no rounding of means.
+        // Equal groups keep their exact value, without the rounding of means.
         for (to, row) in to.color.iter_mut().zip(&of_first) {
             (0..PIXELS).for_each(|i| to[i] = if equal[i] == 1 { row[i] } else { to[i] });
         }
     }
 }
 
-/// What single samples show.
+/// Kernel that evaluates single samples.
 struct Singles<'a, 'j> {
     judge: &'a Certainty<'j>,
     samples: &'a [Sample],
@@ -251,7 +252,7 @@ impl Kernel for Singles<'_, '_> {
         let (mut sums, mut resolved, mut written) = (Sums::EMPTY, [[0.0; PIXELS]; 4], [[0.0; PIXELS]; 4]);
         let (mut brightest, mut last): (Row, &[Sample]) = ([0.0; PIXELS], &[]);
         for some in samples.chunks(PIXELS) {
-            // Large parts of a picture are one colour.
+            // Large parts of a picture have one colour.
             if some != last {
                 sums.take(s, some);
                 resolved = judge.resolved(&sums);
@@ -278,7 +279,7 @@ impl Kernel for Singles<'_, '_> {
     }
 }
 
-/// Standard errors alone.
+/// Kernel that evaluates standard errors alone.
 struct Doubt<'a, 'j> {
     judge: &'a Certainty<'j>,
     sums: &'a [Sums],
@@ -297,13 +298,13 @@ impl Kernel for Doubt<'_, '_> {
 }
 
 impl Certainty<'_> {
-    /// The numbers of the written picture for these sums, the colour premultiplied.
+    /// Written values of these sums, the colour premultiplied.
     #[inline(always)]
     fn written(&self, sums: &Sums) -> Rows {
         self.written_of(sums, self.resolved(sums))
     }
 
-    /// The pixels that these sums are.
+    /// Pixels that these sums resolve to.
     #[inline(always)]
     fn resolved(&self, sums: &Sums) -> Rows {
         let mut rows = [[0.0; PIXELS]; 4];
@@ -314,7 +315,7 @@ impl Certainty<'_> {
         rows
     }
 
-    /// The numbers of the written picture for sums that are these pixels.
+    /// Written values of sums that resolve to these pixels.
     #[inline(always)]
     fn written_of(&self, sums: &Sums, mut rows: Rows) -> Rows {
         if let (Some(behind), true) = (self.background, self.has_veil) {
@@ -337,7 +338,7 @@ impl Certainty<'_> {
         rows
     }
 
-    /// Writes the numbers where glass stands before a background.
+    /// Computes the written values where glass stands before a background.
     #[inline(always)]
     fn write_glass(&self, veils: &[Row; 4], behind: Vec3, rows: &mut Rows) {
         if let Some(developer) = &self.developer {
@@ -352,7 +353,7 @@ impl Certainty<'_> {
         *coverage = [1.0; PIXELS];
     }
 
-    /// What is written without each of the groups.
+    /// Written values with each of the groups left out in turn.
     #[inline(always)]
     fn left_out(&self, sums: &[Sums]) -> [Rows; GROUPS] {
         let mut all = Sums::EMPTY;
@@ -371,7 +372,7 @@ impl Certainty<'_> {
         rows
     }
 
-    /// Standard error of what is written for all groups, from what is written without each of them; none where all groups are
+    /// Jackknife standard error of the written values of all groups, from those without each of them; 0 where all groups are
     /// [`equal`].
     #[inline(always)]
     #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "a handful of groups")]
@@ -410,7 +411,7 @@ fn resolve(sums: &Sums, background: Option<Vec3>, rows: &mut Rows) {
     }
 }
 
-/// What comes through glass of the background, and how much of what covers the pixels is glass.
+/// Background seen through glass, and the share of the coverage that is glass.
 #[inline(always)]
 fn veils(sums: &Sums, background: Vec3) -> [Row; 4] {
     let mut rows = [[0.0; PIXELS]; 4];
@@ -435,7 +436,7 @@ fn mean(of: &[Rows], to: &mut Rows) {
     }
 }
 
-/// By pixel, 1 where all groups are the same.
+/// By pixel, 1 where all groups are equal.
 #[inline(always)]
 fn equal(sums: &[Sums]) -> [u32; PIXELS] {
     let mut equal = [1; PIXELS];

@@ -1,22 +1,22 @@
-//! How many standard errors a confidence takes, when a pixel is looked at again and again.
+//! Number of standard errors for a confidence level when a pixel is judged repeatedly.
 
 use super::GROUPS;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// Degrees of freedom of an estimate from [`GROUPS`] means. What is written out in closed form holds for seven.
+/// Degrees of freedom of an estimate from [`GROUPS`] means. The closed forms below hold for seven.
 const FREEDOM: f64 = (GROUPS - 1) as f64;
 const _: () = assert!(GROUPS == 8);
 
-/// How many estimated standard errors the error that is allowed must be, so that a pixel that stops at the first look
-/// which finds it so is within that error with probability `confidence`.
+/// Number of estimated standard errors that must fit into the allowed error, so that a pixel that stops at the first round where
+/// they do is within that error with probability `confidence`.
 ///
-/// With ρ standard errors in the error allowed, a look stops wrongly when it takes the standard error for ρ/f of what it
-/// is or less, and the mean is off by more than ρ of them: two events that are independent for normal means. From look to
-/// look the samples double, which divides the standard error by √2 at least. The probabilities of all looks are added,
-/// the worst start of ρ is taken, and f is found for which that is 1 − `confidence`; it is never less than Student's t,
-/// which a single look would need.
+/// If ρ true standard errors fit into the allowed error, a round stops wrongly when the estimated standard error is at most ρ/f
+/// of the true one, and the mean is off by more than ρ true ones: two events that are independent for normal means. From round to
+/// round the samples double, which divides the standard error by at least √2. The probabilities of all rounds are added, the
+/// worst initial ρ is taken, and f is found for which that is 1 − `confidence`; it is never less than Student's t, which a single
+/// round would need.
 ///
-/// A search that takes a sixth of a millisecond, once for a picture; what it finds for the usual confidence is known.
+/// The search takes a sixth of a millisecond, once for a picture; its result for the usual confidence is a constant.
 pub(in crate::render) fn factor(confidence: f64) -> f32 {
     const USUAL: f64 = 0.95;
     const OF_USUAL: f32 = 2.364_624_3;
@@ -31,15 +31,15 @@ fn found(confidence: f64) -> f32 {
     student.max(zero(|f| looks.wrong_stops(f) - wrong)) as f32
 }
 
-/// Looks at pixels that start with different errors.
+/// Sequences of rounds of pixels that start with different errors.
 struct Looks {
-    /// By start, what ρ is at each look, and the chance that the mean is off by more than that.
+    /// For each start, ρ at each round, and the probability that the mean is off by more than that.
     of_start: Vec<Vec<(f64, f64)>>,
 }
 
 impl Looks {
     fn new() -> Self {
-        /// By how much each round lessens the standard error at least.
+        /// Factor by which each round lowers the standard error at least.
         const GAIN: f64 = std::f64::consts::SQRT_2;
         const STARTS: u32 = 32;
         let looks =
@@ -49,17 +49,17 @@ impl Looks {
         Self { of_start: of_start.collect() }
     }
 
-    /// Chance that some look stops wrongly, at most.
+    /// Upper bound of the probability that any round stops wrongly.
     fn wrong_stops(&self, factor: f64) -> f64 {
         let look = |(rho, beyond): &(f64, f64)| chi_square_below(FREEDOM * (rho / factor) * (rho / factor)) * beyond;
         self.of_start.iter().map(|looks| looks.iter().map(look).sum::<f64>()).fold(0.0, f64::max)
     }
 }
 
-/// Where a falling function that is positive at ¼ passes zero, in ¼…1000 (1000 where it does not).
+/// Root of a falling function that is positive at ¼, in ¼…1000 (1000 where there is none).
 ///
-/// By the secant of what encloses the place, the end that stays for long counting half (the Illinois method; M. Dowell,
-/// P. Jarratt, "A Modified Regula Falsi Method for Computing the Root of an Equation", 1971).
+/// By the secant of the bracket, where an endpoint that stays for long counts half (the Illinois method; M. Dowell, P. Jarratt,
+/// "A Modified Regula Falsi Method for Computing the Root of an Equation", 1971).
 fn zero(f: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut above) = (0.25, f(0.25));
     let (mut high, mut below) = (low, above);
@@ -91,18 +91,18 @@ fn zero(f: impl Fn(f64) -> f64) -> f64 {
     high
 }
 
-/// Chance of a normal number more than `x` ≥ 0 standard deviations off.
+/// Probability that a normal variate is more than `x` ≥ 0 standard deviations off.
 fn normal_beyond(x: f64) -> f64 {
     libm::erfc(x * FRAC_1_SQRT_2)
 }
 
-/// Chance of χ² with 7 degrees of freedom below `x` ≥ 0.
+/// Probability of χ² with 7 degrees of freedom below `x` ≥ 0.
 fn chi_square_below(x: f64) -> f64 {
     let tail = (2.0 * x / PI).sqrt() * libm::exp(-0.5 * x) * (1.0 + x / 3.0 + x * x / 15.0);
     (libm::erf((0.5 * x).sqrt()) - tail).max(0.0)
 }
 
-/// Chance of Student's t with 7 degrees of freedom within ±`t`.
+/// Probability of Student's t with 7 degrees of freedom within ±`t`.
 fn student_within(t: f64) -> f64 {
     let angle = libm::atan(t / FREEDOM.sqrt());
     let (sin, cos) = libm::sincos(angle);

@@ -1,39 +1,39 @@
-//! Single samples that look as those beside them do, side by side: most of a picture needs no second one.
+//! Compares single samples with their neighbours, side by side: most of a picture needs no second sample.
 
 use super::{Certainty, Range, Seen};
 use crate::math::Vec4;
 use crate::math::simd::{Kernel, Simd};
 use std::ops::Range as Run;
 
-/// What nine numbers lie between is so many times their standard deviation (L. H. C. Tippett, "On the Extreme Individuals and
-/// the Range of Samples Taken from a Normal Population", 1925).
+/// Expected range of nine normal variates, in standard deviations (L. H. C. Tippett, "On the Extreme Individuals and the Range of
+/// Samples Taken from a Normal Population", 1925).
 const RANGE: f32 = 2.970;
 
-/// What single samples are written as: each number in a column of its own.
+/// Written values of single samples, as columns.
 pub(in crate::render) struct Shown {
-    /// RGB and alpha; not a number where nothing is known.
+    /// RGB and alpha; NaN where there is no sample.
     pub(super) colors: [Vec<f32>; 4],
-    /// The greatest channel of light, after exposure.
+    /// Greatest channel of light, after exposure.
     pub(super) brightest: Vec<f32>,
 }
 
 impl Shown {
-    /// Nothing, so many times.
+    /// `count` places without a sample.
     pub(in crate::render) fn nothing(count: usize) -> Self {
         Self { colors: std::array::from_fn(|_| vec![f32::NAN; count]), brightest: vec![0.0; count] }
     }
 
-    /// Room for so many.
+    /// Empty columns with capacity for `count` places.
     pub(super) fn with_capacity(count: usize) -> Self {
         Self { colors: std::array::from_fn(|_| Vec::with_capacity(count)), brightest: Vec::with_capacity(count) }
     }
 
-    /// One number of each place, which is not one where nothing is known.
+    /// One value of each place, NaN where there is no sample.
     pub(in crate::render) fn known(&self) -> &[f32] {
         &self.colors[0]
     }
 
-    /// What is shown at a place.
+    /// What the sample at a place shows.
     pub(in crate::render) fn at(&self, i: usize) -> Seen {
         let color = Vec4::from_array(std::array::from_fn(|c| self.colors[c][i]));
         if color.is_nan() {
@@ -42,34 +42,34 @@ impl Shown {
         Seen { color, range: Range { least: color, most: color, brightest: self.brightest[i] }, error: 0.0 }
     }
 
-    /// Each of the columns.
+    /// All columns.
     pub(in crate::render) fn columns(&self) -> [&[f32]; 5] {
         let [r, g, b, alpha] = &self.colors;
         [r, g, b, alpha, &self.brightest]
     }
 
-    /// The columns, to be changed.
+    /// All columns, mutable.
     pub(in crate::render) fn columns_mut(&mut self) -> [&mut [f32]; 5] {
         let [r, g, b, alpha] = &mut self.colors;
         [r, g, b, alpha, &mut self.brightest]
     }
 }
 
-/// Which of single samples look as all of the eight beside them do; of places that were compared.
+/// Which single samples look like all of their eight neighbours; only for places that were compared.
 pub(in crate::render) struct Even {
     is_uneven: Vec<u32>,
-    /// Standard error of the pixel, the root of the mean over its channels, from the range of nine samples: of it and of the
-    /// pixels beside it, which lie farther apart than it is wide.
+    /// Standard error of each pixel, the root of the mean over its channels, from the range of nine samples: an upper estimate,
+    /// as the neighbours lie farther apart than the pixel is wide.
     errors: Vec<f32>,
 }
 
 impl Even {
-    /// What it looks like is no proof for the sample at this place.
+    /// Marks the sample at this place as uneven, however it looks.
     pub(in crate::render) fn doubt(&mut self, i: usize) {
         self.is_uneven[i] = 1;
     }
 
-    /// Whether the sample at a place looks as all beside it do.
+    /// Whether the sample at a place looks like all its neighbours.
     pub(in crate::render) fn is_even(&self, i: usize) -> bool {
         self.is_uneven[i] == 0
     }
@@ -79,15 +79,15 @@ impl Even {
         self.is_uneven[places].iter().fold(0, |any, uneven| any | uneven) == 0
     }
 
-    /// Standard errors of the pixels at so many places from one on.
+    /// Standard errors of `count` pixels from `start` on.
     pub(in crate::render) fn errors(&self, start: usize, count: usize) -> &[f32] {
         &self.errors[start..start + count]
     }
 }
 
 impl Certainty<'_> {
-    /// Compares single samples of places that follow each other with those beside them. They lie row by row, each with so many
-    /// `columns`; there must be at least one more row on either side, and one more place.
+    /// Compares single samples at consecutive places with their neighbours. Places lie row by row, with `columns` in each; there
+    /// must be at least one more row on either side, and one more place.
     pub(in crate::render) fn compare(&self, shown: &Shown, columns: usize, places: Run<usize>) -> Even {
         let count = shown.brightest.len();
         let mut even = Even { is_uneven: vec![0; count], errors: vec![0.0; count] };
@@ -113,7 +113,7 @@ impl Kernel for Compare<'_, '_> {
         let Self { judge, shown, columns, places, even } = self;
         let (limit, channels) = (Certainty::steep(1) * judge.error, judge.channels());
         let (uneven, errors) = (&mut even.is_uneven[places.clone()], &mut even.errors[places.clone()]);
-        // Alpha is the same everywhere where it is not written.
+        // Where alpha is not written, it is not compared.
         for column in &shown.colors[..channels] {
             let rows = [places.start - columns, places.start, places.start + columns];
             differ(rows.map(|at| &column[at - 1..=at + places.len()]), limit, (&mut *uneven, &mut *errors));
@@ -124,12 +124,12 @@ impl Kernel for Compare<'_, '_> {
     }
 }
 
-/// Notes of places that follow each other where one of the nine at and around them is farther than the limit from the one in the
-/// middle, and adds the square of what they lie between; `rows` begin one place before and end one behind.
+/// Marks consecutive places where one of the nine values at and around them is farther than the limit from the middle one, and
+/// adds the square of their range to `errors`; `rows` begin one place before and end one behind.
 #[inline(always)]
 fn differ([above, own, below]: [&[f32]; 3], limit: f32, (uneven, errors): (&mut [u32], &mut [f32])) {
     let count = own.len().saturating_sub(2).min(uneven.len()).min(errors.len());
-    // Of known lengths, so that nothing is asked within the loop.
+    // Equal, known lengths, so that the loop has no bounds checks.
     let [above, own, below] = [above, own, below].map(|row| &row[..count + 2]);
     let (uneven, errors) = (&mut uneven[..count], &mut errors[..count]);
     for i in 0..count {
@@ -144,13 +144,13 @@ fn differ([above, own, below]: [&[f32]; 3], limit: f32, (uneven, errors): (&mut 
     }
 }
 
-/// The lesser of two numbers; a second one that is none changes nothing.
+/// Minimum of two numbers; a NaN as the second is ignored.
 #[inline(always)]
 fn least(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
 }
 
-/// The greater one.
+/// Maximum of two numbers, likewise.
 #[inline(always)]
 fn most(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
@@ -166,7 +166,7 @@ mod tests {
     use crate::render::frame::Sum;
     use crate::render::whitted::Sample;
 
-    /// Samples of which those in the left columns of 41 look alike.
+    /// Samples that look alike in the left columns of 41.
     fn samples(count: usize) -> Vec<Sample> {
         let mut random = Random::new(5);
         let steps = (0..count).map(|_| (random.unit() * 5.0).floor()).collect::<Vec<_>>();

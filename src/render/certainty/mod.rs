@@ -1,17 +1,17 @@
-//! When the mean of a pixel's samples is certain enough.
+//! Decides when the mean of a pixel's samples is certain enough.
 //!
 //! A pixel's samples are runs of one scrambled sequence: [`GROUPS`] groups, each of which fills the pixel evenly, and all
-//! together more evenly than groups of different scramblings would. Each has a mean of its own, and how far these lie apart
-//! bounds how far the mean of all is off (A. B. Owen, "Randomized QMC", 2013, chapter 17, for groups that know nothing of
-//! each other; where one fills the gaps that another leaves, the mean of all is better than that, and the estimate errs to
-//! the safe side). What counts is the written picture: the mean goes through the tone curve, so its error there is found by
-//! leaving out each group in turn (J. W. Tukey's jackknife, 1958).
+//! together more evenly than groups of different scramblings would. Each group has its own mean, and the spread of these bounds
+//! the error of the overall mean (A. B. Owen, "Randomized QMC", 2013, chapter 17, for independent groups; where one group fills
+//! the gaps of another, the overall mean is better than that, and the estimate errs on the safe side). What counts is the written
+//! picture: the mean goes through the tone curve, so its error there is found by leaving out each group in turn (J. W. Tukey's
+//! jackknife, 1958).
 //!
-//! Where few samples see what is bright, most pixels that have not met it yet look certain. So the samples of a pixel are taken
-//! to vary no less than those of the fifth of the eight pixels beside it, in the order of how much they vary.
+//! Where few samples hit a bright light, most pixels that have not hit it yet look certain. So a pixel's samples are assumed to
+//! vary no less than those of the fifth of its eight neighbours, ordered by variance.
 //!
-//! A pixel is looked at again and again, and stops at the first look that is content. Were each look 95 % certain, all
-//! together would be less. See [`factor`] for what is done about it.
+//! A pixel is judged repeatedly, and stops at the first round that finds it certain. Were each round 95 % certain, all together
+//! would be less. [`factor`] corrects for that.
 
 mod beside;
 mod confidence;
@@ -27,39 +27,39 @@ pub(in crate::render) use beside::Pixels;
 pub(in crate::render) use confidence::factor;
 pub(in crate::render) use even::{Even, Shown};
 
-/// Groups of a pixel's samples.
+/// Number of groups of a pixel's samples.
 pub(super) const GROUPS: usize = 8;
 
-/// Samples that tell by themselves what a pixel shows; one that has fewer must look as those beside it do.
+/// Number of samples that suffice by themselves; a pixel with fewer must look like its neighbours.
 pub(super) const SURE: u32 = 4;
 
-/// The judge of all pixels of a picture.
+/// Judges all pixels of a picture.
 pub(super) struct Certainty<'a> {
-    /// `None`: errors are counted in linear light.
+    /// `None`: errors are measured in linear light.
     developer: Option<Developer<'a>>,
     background: Option<Vec3>,
-    /// Whether glass may stand before it.
+    /// Whether glass may stand before the background.
     has_veil: bool,
-    /// Whether the written picture is transparent in parts.
+    /// Whether the written picture has an alpha channel that counts.
     transparent: bool,
-    /// By how much the exposure multiplies light.
+    /// Factor that the exposure applies to light.
     gain: f32,
-    /// What a pixel may be wrong by.
+    /// Allowed error of a pixel.
     error: f32,
-    /// How many standard errors that must be.
+    /// Number of standard errors that must fit into the allowed error.
     factor: f32,
     level: Level,
 }
 
-/// How the mean of a pixel is to be written; what is behind it is in [`Certainty`].
+/// How a pixel's mean is written; [`Certainty`] holds the background.
 pub(super) fn output(space: ErrorSpace, background: Option<Vec3>) -> Option<Output> {
     let ErrorSpace::Display { tone_map, exposure } = space else { return None };
     Some(Output { tone_map, exposure, background: background.map(|b| b.to_array()), ..Output::default() })
 }
 
 impl<'a> Certainty<'a> {
-    /// Of a picture that is written as `output` says (`None`: as linear light), each pixel of it within `error`, of which
-    /// that must be so many standard errors ([`factor`]).
+    /// For a picture that is written as `output` says (`None`: as linear light), with each pixel within `error`, which must hold
+    /// `factor` standard errors ([`factor`]).
     pub(super) fn new(
         output: Option<&'a Output>,
         (background, has_veil): (Option<Vec3>, bool),
@@ -72,7 +72,7 @@ impl<'a> Certainty<'a> {
         Self { developer, background, has_veil, transparent, gain, error, factor, level: Level::best() }
     }
 
-    /// Of a picture that is sampled so.
+    /// For a picture that is sampled as `how` says.
     pub(super) fn of(
         frame: &Frame,
         how: &Stochastic,
@@ -83,13 +83,13 @@ impl<'a> Certainty<'a> {
         Self::new(output, (frame.background, frame.has_veil), transparent, how.error, frame.standard_errors)
     }
 
-    /// Whether samples in this range agree within the error that is allowed: nothing is seen in the pixel that could be missed.
+    /// Whether samples in this range agree within the allowed error: the pixel shows no detail that could be missed.
     pub(super) fn agree(&self, range: &Range) -> bool {
         (range.most - range.least).cmple(Vec4::splat(self.error)).all()
     }
 
-    /// Whether what makes a pixel uneven is thinner than it: of the nine pixels around and with it hardly any is of one of the
-    /// colours that it lies between. An edge has at least three on each side.
+    /// Whether the detail that makes a pixel uneven is thinner than a pixel: of the nine pixels around and including it, fewer
+    /// than three lie on one side of the middle of its range. An edge has at least three on each side.
     pub(super) fn is_thin(&self, own: &Range, around: impl Iterator<Item = Seen>) -> bool {
         let (wide, middle) = (own.most - own.least, (own.least + own.most) * 0.5);
         let channel = (0..self.channels()).fold(0, |most, c| if wide[c] > wide[most] { c } else { most });
@@ -101,32 +101,32 @@ impl<'a> Certainty<'a> {
         above.min(below) < 3
     }
 
-    /// How grey light as bright as this is written, after exposure.
+    /// Written value of grey light this bright, after exposure.
     pub(super) fn grey(&self, light: f32) -> f32 {
         let grey = light / self.gain;
         self.developer.as_ref().map_or(grey, |developer| developer.coded([grey, grey, grey, 1.0])[0])
     }
 
-    /// What grey light as bright as this lies between, after exposure.
+    /// Range of written values of grey light this bright, after exposure.
     pub(super) fn range_of(&self, light: f32) -> Range {
         let grey = self.grey(light);
-        // It may show whatever covers the pixel.
+        // Alpha is left open: the light may show whatever covers the pixel.
         let without_alpha = |alpha: f32| Vec4::new(grey, grey, grey, alpha);
         Range { least: without_alpha(f32::INFINITY), most: without_alpha(f32::NEG_INFINITY), brightest: light }
     }
 
-    /// The greatest channel of the light of any of these groups, after exposure.
+    /// Greatest channel of the light of any of these groups, after exposure.
     fn brightest(&self, groups: &[Sum]) -> f32 {
         groups.iter().map(|group| self.light(group)).fold(0.0, f32::max)
     }
 
-    /// The greatest channel of the light of a group, after exposure.
+    /// Greatest channel of the light of a group, after exposure.
     #[inline(always)]
     fn light(&self, group: &Sum) -> f32 {
         group.radiance.max_element() / group.weight.max(f32::MIN_POSITIVE) * self.gain
     }
 
-    /// How far apart the ends of a range are, the root of the mean over the channels.
+    /// Width of a range, the root of the mean over the channels.
     #[expect(clippy::cast_precision_loss, reason = "a handful of channels")]
     pub(super) fn contrast(&self, range: &Range) -> f32 {
         let wide = (range.most - range.least).max(Vec4::ZERO);
@@ -134,7 +134,7 @@ impl<'a> Certainty<'a> {
         (squares / self.channels() as f32).sqrt()
     }
 
-    /// How many times as far as white a sample as bright as `around` would move the mean of a pixel: 1 where none of these
+    /// Factor by which a sample as bright as `around` would move a pixel's mean farther than white does: 1 where none of these
     /// groups can have missed it, since they differ by about as much as one of its samples would make them.
     pub(super) fn beyond_white(&self, groups: &[Sum], around: f32) -> f32 {
         if around <= 1.0 || self.developer.is_none() {
@@ -145,14 +145,14 @@ impl<'a> Certainty<'a> {
         if (self.brightest(groups) - least) * samples >= 0.5 * around { 1.0 } else { around }
     }
 
-    /// Whether a pixel of so many samples looks so different from one beside it that something may lie between them.
+    /// Whether two neighbouring pixels, of `samples` each, look so different that a detail may lie between them.
     pub(super) fn differ(&self, a: Vec4, b: Vec4, samples: u32) -> bool {
         (a - b).abs().cmpgt(Vec4::splat(Self::steep(samples) * self.error)).any()
     }
 
-    /// How many times the error that is allowed pixels of so many samples may differ. Few must show next to the same, as they
-    /// tell nothing else; more may differ by what shading changes from pixel to pixel, but not as colours on both sides of an
-    /// edge do, which may reach into the pixel as far as samples lie apart.
+    /// Multiple of the allowed error by which pixels of `samples` may differ. With few samples they must look nearly the same, as
+    /// there is no other evidence; with more they may differ by what shading changes from pixel to pixel, but not like the
+    /// colours on both sides of an edge, which may reach into the pixel as far as samples lie apart.
     const fn steep(samples: u32) -> f32 {
         match samples {
             1 => 0.25,
@@ -161,20 +161,20 @@ impl<'a> Certainty<'a> {
         }
     }
 
-    /// What part of the error that is allowed a pixel with this standard error uses, when around it there is such a
-    /// contrast; up to 1 it is as certain as was asked.
+    /// Fraction of the allowed error that a pixel with this standard error uses, given the contrast around it; up to 1 it is
+    /// certain enough.
     ///
-    /// Samples that saw nothing of what lies around them are not far apart, and no proof that nothing of it is in the pixel.
-    /// One sample of `count` that sees it makes the standard error `contrast / count`: what has not been seen yet is given
-    /// half a sample (H. Jeffreys, "An Invariant Form for the Prior Probability in Estimation Problems", 1946).
+    /// Samples that saw nothing of their surroundings do not vary, which is no proof that none of it is in the pixel. One sample
+    /// of `count` that sees it makes the standard error `contrast / count`: unseen contrast is given half a sample (H. Jeffreys,
+    /// "An Invariant Form for the Prior Probability in Estimation Problems", 1946).
     #[expect(clippy::cast_precision_loss, reason = "a count of samples")]
     pub(super) fn used(&self, standard_error: f32, contrast: f32, count: u32) -> f32 {
         let unseen = 0.5 * contrast / count.max(1) as f32;
         standard_error.max(unseen) * self.factor / self.error
     }
 
-    /// Samples of `count` without which a pixel that used this part of its error would have been certain: fewer of them
-    /// make an error that is larger by no more than their number is smaller, as samples that are spread evenly do.
+    /// Number of samples of `count` that a pixel using this fraction of its error could have done without: the error grows at
+    /// most in inverse proportion to the number of samples, as for evenly spread ones.
     #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part")]
     pub(super) fn spare(&self, used: f32, count: u32) -> u32 {
         ((1.0 - used.clamp(0.0, 1.0)) * count.saturating_sub(GROUPS as u32) as f32) as u32
@@ -185,36 +185,36 @@ impl<'a> Certainty<'a> {
     }
 }
 
-/// What the samples of a pixel show, in the numbers of the written picture.
+/// What the samples of a pixel show, in values of the written picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
-    /// Of their mean, to within what bends the tone curve.
+    /// Colour of the mean, up to the curvature of the tone curve.
     pub color: Vec4,
-    /// What they lie between.
+    /// Range of the samples.
     pub range: Range,
     /// Standard error of the mean.
     pub error: f32,
 }
 
 impl Seen {
-    /// Nothing: it agrees with everything.
+    /// No samples: agrees with everything.
     pub(super) const NOTHING: Self = Self { color: Vec4::NAN, range: Range::NOTHING, error: 0.0 };
 }
 
-/// What the colours of samples lie between, channel by channel.
+/// Range of the colours of samples, channel by channel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Range {
     least: Vec4,
     most: Vec4,
-    /// Their brightest channel of light, which may be more than can be written.
+    /// Brightest channel of light, which may exceed what can be written.
     pub brightest: f32,
 }
 
 impl Range {
-    /// Of no samples.
+    /// Range of no samples.
     pub(super) const NOTHING: Self = Self { least: Vec4::INFINITY, most: Vec4::NEG_INFINITY, brightest: 0.0 };
 
-    /// Of the samples of both.
+    /// Union of both ranges.
     pub(super) fn with(self, other: Self) -> Self {
         Self {
             least: self.least.min(other.least),
@@ -250,7 +250,7 @@ mod tests {
     fn pixels_of_few_samples_must_look_more_alike_than_those_of_many() {
         let judge = Certainty::new(None, (None, false), false, 0.1, 1.0);
         let differ = |step: f32, samples| judge.differ(Vec4::ZERO, Vec4::splat(step), samples);
-        // One that shows next to the same, what is within the error, and what shading may change from pixel to pixel.
+        // The limits of one sample, of two and three, and of more, which allow for shading from pixel to pixel.
         for (samples, most) in [(1, 0.025), (2, 0.1), (3, 0.1), (4, 0.2), (256, 0.2)] {
             assert!(!differ(0.99 * most, samples) && differ(1.01 * most, samples), "{samples}");
         }
@@ -274,7 +274,7 @@ mod tests {
         assert!(!is_thin([0.0, 0.0, 0.0, 0.3, 0.5, 0.9, 1.0, 1.0, 1.0]));
         assert!(is_thin([0.0, 0.0, 0.0, 0.3, 0.5, 0.9, 0.0, 0.0, 0.0]));
         assert!(is_thin([1.0, 1.0, 1.0, 1.0, 0.5, 1.0, 1.0, 1.0, 1.0]));
-        // At the border of the picture, an edge with nothing behind it.
+        // At the border of the picture: an edge with no pixels beyond it.
         let mut at_border = seen([0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 1.0, 1.0, 1.0]);
         at_border[6..].fill(Seen::NOTHING);
         assert!(judge.is_thin(&own.range, at_border.into_iter()));
@@ -282,14 +282,14 @@ mod tests {
 
     #[test]
     fn rays_that_nobody_needed_are_those_beyond_the_error_that_was_allowed() {
-        // Powers of two, of which products are exact.
+        // Powers of two, whose products are exact.
         let judge = Certainty::new(None, (None, false), false, 1.0 / 64.0, 2.0);
         assert_eq!(judge.used(1.0 / 128.0, 0.0, 64), 1.0);
         assert_eq!(judge.spare(1.0, 64), 0);
-        // Half the error: half of the rays beyond the first.
+        // Half the error: half of the samples beyond the first [`GROUPS`].
         assert_eq!(judge.used(1.0 / 256.0, 0.0, 64), 0.5);
         assert_eq!(judge.spare(0.5, 72), 32);
-        // Half a sample of what lies around, of 64.
+        // Half a sample of the surroundings, out of 64.
         assert_eq!(judge.used(0.0, 1.0, 64), 1.0);
     }
 
@@ -301,7 +301,7 @@ mod tests {
         assert_eq!(see(&judge, &[grey(64.0, 2.0), grey(0.5, 2.0)]).range.brightest, 64.0);
         assert_eq!(judge.beyond_white(&groups, 64.0), 64.0);
         assert_eq!(judge.beyond_white(&groups, 0.7), 1.0, "less than white is seen as it is");
-        // One of four samples has met it.
+        // One of four samples has hit it.
         groups[3] = grey(16.0, 4.0);
         assert_eq!(judge.beyond_white(&groups, 64.0), 1.0);
         let linear = Certainty::new(None, (None, false), false, 0.01, factor(0.95));
@@ -318,7 +318,7 @@ mod tests {
         assert!((found - expected).abs() < 1e-6, "{found} {expected}");
     }
 
-    /// Pixels of normal samples, in rounds that double, judged as pictures are.
+    /// Pixels of normal samples, in rounds that double, judged as in pictures.
     #[test]
     fn pixels_that_stop_at_the_first_content_look_are_right_as_often_as_asked() {
         let judge = Certainty::new(None, (None, false), false, 0.05, factor(0.95));
@@ -348,7 +348,7 @@ mod tests {
         }
     }
 
-    /// The mean of squared errors of many pixels of one brightness each, and of their squared standard errors.
+    /// Means, over many pixels of constant brightness, of the squared errors and of the squared standard errors.
     fn squares(samples: u32, brightness: impl Fn([f64; 2], u32) -> f64, mean: f64) -> (f64, f64) {
         let judge = Certainty::new(None, (None, false), false, 0.01, factor(0.95));
         let pixels = 2000;
@@ -371,7 +371,7 @@ mod tests {
     fn what_groups_differ_by_is_no_less_than_what_their_mean_is_off() {
         let edge = |[x, y]: [f64; 2], _: u32| f64::from(u8::from(y < 0.31 + 0.4 * x));
         let gradient = |[x, y]: [f64; 2], _: u32| 0.7 * x + 0.3 * y;
-        // Nothing of this is spread evenly.
+        // Pure noise is not stratified.
         let noise = |_: [f64; 2], random: u32| f64::from(random) / 4_294_967_296.0;
         for samples in [8, 32, 128] {
             for (what, (error, estimate), at_least) in [

@@ -1,4 +1,4 @@
-//! Which materials absorb the light that goes through their inside, and how strongly.
+//! Materials that absorb light inside, and their coefficients.
 
 use crate::accel::{Hit, Ray};
 use crate::math::Vec3;
@@ -7,12 +7,12 @@ use crate::render::optics::transmittance;
 use crate::render::wave::Path;
 use crate::scene::{Material, Reflection};
 
-/// Coefficients of Beer's law by material, 1 / unit of length; empty where nothing absorbs light.
+/// Coefficients of Beer's law by material, 1 / unit of length; empty where no material absorbs light.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Absorption(Vec<Vec3>);
 
 impl Absorption {
-    /// The coefficients of all materials; with `no_prune` also where all are zero.
+    /// Coefficients of all materials; with `no_prune` even where all are zero.
     pub(crate) fn of(materials: &[Material], no_prune: bool) -> Self {
         let coefficient = |material: &Material| match &material.reflection {
             Reflection::MetalRough(m) if m.thick && m.transmission > 0.0 => m.absorption,
@@ -22,22 +22,22 @@ impl Absorption {
         Self(if no_prune || all.iter().any(|a| *a != Vec3::ZERO) { all } else { Vec::new() })
     }
 
-    /// Whether there is any.
+    /// Whether any material absorbs light.
     pub(crate) fn is_some(&self) -> bool {
         !self.0.is_empty()
     }
 
-    /// The coefficient of the inside of a material.
+    /// Coefficient inside a material.
     pub(crate) fn by(&self, material: u32) -> Option<Vec3> {
         self.0.get(material as usize).copied()
     }
 
-    /// The coefficient of the medium that a ray is in; `None` in empty space.
+    /// Coefficient of the medium that a ray is in; `None` in empty space.
     pub(crate) fn within(&self, table: &MediaTable, media: Media) -> Option<Vec3> {
         self.by(table.innermost(media)?.material)
     }
 
-    /// A path after what its ray is inside of has absorbed its part of the light up to `hit`.
+    /// The path after absorption in the medium of its ray up to `hit`.
     pub(crate) fn attenuated(&self, table: &MediaTable, ray: &Ray, path: &Path, hit: &Hit) -> Path {
         let length = (hit.t - path.since) * ray.dir.length();
         let left = self.within(table, path.media).map_or(Vec3::ONE, |a| transmittance(a, length));

@@ -1,4 +1,4 @@
-//! What an eye is inside of: rays from it begin there, are bent by what they leave, and absorbed from the start.
+//! Media around the eye: its rays start inside them, are refracted where they leave them, and absorbed from the start.
 
 use crate::accel::{Accel, Hit, NoProbe, Ray};
 use crate::math::Vec3;
@@ -10,11 +10,11 @@ use crate::render::surface::{HitPrim, Surface};
 use crate::render::view::View;
 use crate::scene::{Material, Reflection};
 
-/// Surfaces that are looked at along one way; where there are more behind each other, it says nothing.
+/// Maximum number of surfaces examined along one direction; where more lie behind each other, that direction is ignored.
 const FACES: usize = 1024;
 
-/// The substances around the eye of a view, the innermost last, where any have an inside: those that are left without
-/// having been entered, whichever way one goes. Panes without an inside are so left on some ways only.
+/// Media around the eye of a view, the innermost last, if any material has an inside: those that rays leave without having
+/// entered them, in every direction. Panes without an inside are left in this way only in some directions.
 pub(in crate::render) fn media_around<A: Accel>(context: &Context, accel: &A, view: &View) -> Vec<Medium> {
     if !context.scene.materials.iter().any(has_inside) {
         return Vec::new();
@@ -23,18 +23,18 @@ pub(in crate::render) fn media_around<A: Accel>(context: &Context, accel: &A, vi
     let mut left = directions(view).filter_map(|dir| left_along(context, accel, &mut scratch, view, dir));
     let Some(first) = left.next() else { return Vec::new() };
     let around = left.fold(first, |around, left| in_both(&around, left));
-    // The first that is left is the innermost.
+    // The medium left first is the innermost.
     let medium = |&material: &u32| Medium { material, ior: index(&context.scene.materials[material as usize]) };
     around.iter().rev().map(medium).collect()
 }
 
-/// Along the view, and all around in the corners of a cube.
+/// The view direction, and those to the corners of a cube.
 fn directions(view: &View) -> impl Iterator<Item = Vec3> {
     let corner = |i: u32| Vec3::from([0, 1, 2].map(|k| if i >> k & 1 == 1 { 1.0 } else { -1.0 }));
     std::iter::once(view.forward.as_vec3()).chain((0..8).map(corner))
 }
 
-/// What of the first list is in the second, too, as often as it is there: bodies of one material may lie in each other.
+/// Elements of the first list that are in the second, too, as often as there: bodies of one material may be nested.
 fn in_both(first: &[u32], mut second: Vec<u32>) -> Vec<u32> {
     let is_in_both = |material: &&u32| {
         let at = second.iter().position(|other| other == *material);
@@ -43,7 +43,7 @@ fn in_both(first: &[u32], mut second: Vec<u32>) -> Vec<u32> {
     first.iter().filter(is_in_both).copied().collect()
 }
 
-/// Materials that are left on one way without having been entered, each as often as it is; `None` where the way has no end.
+/// Materials that a ray leaves without having entered, with repetitions; `None` where the way does not end.
 fn left_along<A: Accel>(
     context: &Context,
     accel: &A,
@@ -78,7 +78,7 @@ fn left_along<A: Accel>(
     None
 }
 
-/// Index of refraction of the inside of a material.
+/// Index of refraction inside a material.
 fn index(material: &Material) -> f32 {
     let ior = match &material.reflection {
         Reflection::Phong(phong) => phong.ior,

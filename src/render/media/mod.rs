@@ -1,4 +1,4 @@
-//! The substances that rays are inside of, and what happens at their boundaries.
+//! The media that rays travel in, and what happens at their boundaries.
 
 pub(super) mod absorption;
 pub(super) mod around_eye;
@@ -7,7 +7,7 @@ use super::sobol::mix;
 use crate::scene::MAX_DEPTH;
 use std::collections::HashMap;
 
-/// One substance a ray is inside of.
+/// One medium a ray is inside of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Medium {
     /// Index into the scene's materials.
@@ -16,54 +16,54 @@ pub(crate) struct Medium {
     pub ior: f32,
 }
 
-/// The substances a ray is inside of: a list in the [`MediaTable`] of the worker that traces it.
+/// The media a ray is inside of: a list in the [`MediaTable`] of the worker that traces it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Media(u32);
 
 impl Media {
-    /// Nothing but empty space.
+    /// Empty space.
     pub(crate) const OUTSIDE: Self = Self(0);
 }
 
-/// What happens to a ray at the boundary of a substance.
+/// What happens to a ray at the boundary of a medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Crossing {
-    /// Index on the side the ray comes from.
+    /// Index of refraction on the side the ray comes from.
     pub n_i: f32,
-    /// Index on the other side.
+    /// Index of refraction on the other side.
     pub n_t: f32,
-    /// What a ray that goes through is inside of afterwards.
+    /// Media around the ray after transmission.
     pub beyond: Media,
 }
 
 impl Crossing {
-    /// How many times as far as normals directions turn that go through, when light falls in steeply.
+    /// How many times as far as normals the directions of refracted rays turn, at near-normal incidence.
     pub(crate) fn turns(&self) -> f32 {
         (1.0 - self.n_i / self.n_t).abs()
     }
 }
 
-/// What rays are inside of, as lists of substances, the innermost last, each of which goes on from a shorter one.
+/// Stacks of nested media, the innermost last, stored as linked lists that share their outer parts.
 ///
-/// After C. M. Schmidt and B. Budge, "Simple Nested Dielectrics in Ray Traced Images" (2002), with the most recently
-/// entered substance as the one that counts. A substance that was never entered may be left (an open mesh).
+/// After C. M. Schmidt and B. Budge, "Simple Nested Dielectrics in Ray Traced Images" (2002), where the most recently entered
+/// medium takes precedence. A medium that was never entered may be left (an open mesh).
 ///
-/// Each is there once: rays that have gone the same way share theirs.
+/// Each list is stored once: rays that have gone the same way share it.
 #[derive(Debug, Default)]
 pub(crate) struct MediaTable {
     lists: Vec<List>,
-    /// Finds each list by what it holds: it is in the first slot that was free from the one on that its hash names. Their number
-    /// is a power of two, and at most half are taken.
+    /// Hash table of the lists by content, with linear probing. The number of slots is a power of two, and at most half of them
+    /// are taken.
     slots: Vec<Media>,
-    /// That in which rays start.
+    /// List in which rays start.
     start: Media,
-    /// What was entered after what is left: a buffer.
+    /// Buffer for the media that were entered after the one that is left.
     within: Vec<Medium>,
-    /// It is not asked which lists are held while there are fewer.
+    /// Unused lists are kept while there are fewer lists than this.
     limit: usize,
 }
 
-/// A substance that was entered from within another list.
+/// A medium that was entered from within another list.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct List {
     innermost: Medium,
@@ -78,28 +78,28 @@ impl List {
 }
 
 impl MediaTable {
-    /// Index of empty space.
+    /// Index of refraction of empty space.
     const EMPTY_SPACE: f32 = 1.0;
-    /// Slots of a table that is not empty.
+    /// Minimum number of slots of a table that is not empty.
     const LEAST: usize = 16;
-    /// Substances of a list at most, so that what is entered again and again and never left takes no more time with each: more
-    /// than an eye may start inside of, and its rays then enter. What is entered then is the only one.
+    /// Maximum length of a list, so that a medium that is entered again and again and never left costs no more time each time:
+    /// more than an eye may start inside of plus what its rays then enter. A medium entered beyond that is the only one.
     const MOST: u32 = 2 * MAX_DEPTH;
-    /// So many lists are made before it is asked which of them no ray holds any more.
+    /// Number of lists before unused ones are dropped.
     const MANY: usize = 1 << 14;
 
-    /// Whether so many lists were made that it is worth asking which of them rays still hold.
+    /// Whether there are so many lists that it is worth dropping those that no ray uses.
     pub(crate) fn is_large(&self) -> bool {
         self.lists.len() >= self.limit.max(Self::MANY)
     }
 
-    /// Forgets all lists but those that rays hold, all of which are in `held`, and the one in which rays start, which stays what
-    /// it is.
+    /// Drops all lists but those that rays use, all of which are in `held`, and the one in which rays start, whose index stays
+    /// the same.
     pub(crate) fn retain<'m>(&mut self, held: impl Iterator<Item = &'m mut Media>) {
         let all = std::mem::take(self);
-        // By number, the list as it is called from now on.
+        // New index of each list.
         let mut renamed = HashMap::new();
-        // What was made first is made first again.
+        // The first list stays the first.
         self.start = self.adopt(&all, all.start, &mut renamed);
         debug_assert_eq!(self.start, all.start);
         for media in held {
@@ -108,7 +108,7 @@ impl MediaTable {
         self.limit = 2 * self.lists.len();
     }
 
-    /// Makes a list as it is in another table, and those it goes on from, unless that was done.
+    /// Copies a list from another table, with the lists it extends, unless that was done.
     fn adopt(&mut self, other: &Self, media: Media, renamed: &mut HashMap<Media, Media>) -> Media {
         let (mut missing, mut outer) = (Vec::new(), media);
         let mut made = loop {
@@ -126,7 +126,7 @@ impl MediaTable {
         made
     }
 
-    /// Forgets all lists and makes that of these substances, the innermost last, in which rays start.
+    /// Drops all lists and makes that of these media, the innermost last, in which rays start.
     pub(crate) fn reset(&mut self, start: &[Medium]) -> Media {
         if !self.lists.is_empty() {
             self.lists.clear();
@@ -141,7 +141,7 @@ impl MediaTable {
         self.lists.get((media.0 as usize).checked_sub(1)?)
     }
 
-    /// The substance that counts; `None` in empty space.
+    /// Medium that takes precedence; `None` in empty space.
     pub(crate) fn innermost(&self, media: Media) -> Option<Medium> {
         self.list(media).map(|list| list.innermost)
     }
@@ -170,7 +170,7 @@ impl MediaTable {
         self.slots[slot]
     }
 
-    /// Where a list is, or would be.
+    /// Slot where a list is, or would be inserted.
     fn slot(&self, list: &List) -> usize {
         let last = self.slots.len() - 1;
         let mut slot = list.hash() & last;
@@ -190,7 +190,7 @@ impl MediaTable {
         }
     }
 
-    /// The list without the last substance of this material, if it is in there.
+    /// The list without the last medium of this material; `None` if it has none.
     fn leave(&mut self, media: Media, material: u32) -> Option<Media> {
         self.within.clear();
         let mut without = media;
@@ -208,13 +208,13 @@ impl MediaTable {
         Some(without)
     }
 
-    /// A surface with the same on both sides, which rays pass straight.
+    /// Crossing of a surface with the same medium on both sides, which rays pass straight.
     pub(crate) fn pass(&self, media: Media) -> Crossing {
         let ior = self.ior(media);
         Crossing { n_i: ior, n_t: ior, beyond: media }
     }
 
-    /// The indices on both sides of the surface of `medium`, and the media beyond it, for a ray that comes from within `media`.
+    /// Indices of refraction on both sides of the surface of `medium`, and the media beyond it, for a ray inside `media`.
     pub(crate) fn cross(&mut self, media: Media, medium: Medium, entering: bool) -> Crossing {
         let innermost = self.innermost(media);
         let here = innermost.map_or(Self::EMPTY_SPACE, |medium| medium.ior);
@@ -354,7 +354,7 @@ mod tests {
         assert!(table.lists.len() < 2000 && !table.is_large(), "{}", table.lists.len());
         assert!(rays.iter().map(|&media| held(&table, media)).eq(before));
         assert_eq!((rays[101], rays[102]), (rays[3], start));
-        // What is made anew is found where it is.
+        // A list that is made again is found in its old place.
         let lists = table.lists.len();
         let left = table.list(rays[5]).unwrap();
         let (innermost, outer) = (left.innermost, left.outer);
@@ -367,9 +367,9 @@ mod tests {
         let within = table.reset(&[WATER, GLASS]);
         let blue = Medium { ior: 1.53, ..GLASS };
         assert_eq!(indices(&table.cross(within, blue, false)), (1.53, 1.33));
-        // The water around it is not what it leaves.
+        // The water around the glass is not the innermost medium.
         assert_eq!(indices(&table.cross(within, WATER, false)), (1.5, 1.5));
-        // More of the same lies around that.
+        // Another layer of glass around it.
         let twice = table.reset(&[GLASS, GLASS]);
         assert_eq!(indices(&table.cross(twice, blue, false)), (1.53, 1.53));
     }

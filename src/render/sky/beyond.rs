@@ -1,4 +1,4 @@
-//! What rays that meet nothing see of the studio, side by side: one number of all rays, then the next.
+//! Radiance of the environment for many rays that miss the scene, as columns (structure of arrays).
 
 use super::{Sky, WIDE};
 use crate::math::Vec3;
@@ -6,22 +6,22 @@ use crate::math::simd::{Kernel, Level, Simd};
 use crate::render::studio;
 use crate::scene::UpAxis;
 
-/// Rays that look at it together.
+/// Number of rays that are looked up together.
 const RAYS: usize = 32;
 
-/// Directions of rays, of any length, and what is seen along them.
+/// Directions of rays, of any length, and the radiance along them.
 struct Looks {
     count: usize,
-    /// What each is known by.
+    /// Index of each ray.
     rays: [u32; RAYS],
     dir: [[f32; RAYS]; 3],
-    /// Red, green and blue alike: the room is grey.
+    /// Radiance, the same in red, green and blue: the room is grey.
     radiance: [f32; RAYS],
 }
 
 impl Sky {
-    /// Tells what is seen along each of these directions by rays whose cones are so many radians across, as [`Self::radiance`]
-    /// does; a ray is known by its number. Not in their order.
+    /// Passes the radiance along each direction to `tell`, with the ray's number, as [`Self::radiance`] has it; cones are given
+    /// as radians across. The order is not that of the rays.
     pub(crate) fn each_radiance(&self, rays: impl Iterator<Item = (u32, Vec3, f32)>, mut tell: impl FnMut(u32, Vec3)) {
         let (mut looks, studio) = (Looks::NONE, self.studio());
         for (ray, dir, angle) in rays {
@@ -40,8 +40,8 @@ impl Sky {
         }
     }
 
-    /// Tells what is behind everything for some of many rays from the eye, as [`Self::behind`] does, by their numbers in order;
-    /// directions by axis, and how wide each cone is.
+    /// Passes the background behind the eye rays with these numbers to `tell`, in order, as [`Self::behind`] has it; directions
+    /// are given by axis, cones as radians across.
     pub(crate) fn each_behind(
         &self,
         rays: &[u32],
@@ -55,7 +55,7 @@ impl Sky {
         };
         let mut looks = Looks::NONE;
         for some in rays.chunks(RAYS) {
-            // Where nothing is near, their numbers follow each other.
+            // Where no surface is near, their numbers are consecutive.
             let run = match some {
                 [first, .., last] if last.wrapping_sub(*first) == RAYS as u32 - 1 && some.len() == RAYS => {
                     looks.take(*first, dirs)
@@ -71,10 +71,10 @@ impl Sky {
 }
 
 impl Looks {
-    /// Nothing.
+    /// No rays.
     const NONE: Self = Self { count: 0, rays: [0; RAYS], dir: [[0.0; RAYS]; 3], radiance: [0.0; RAYS] };
 
-    /// Takes rays that follow each other from `first` on, if so many are there, instead of all others.
+    /// Replaces all rays by [`RAYS`] consecutive ones from `first` on; `None` if there are fewer.
     fn take(&mut self, first: u32, dirs: [&[f32]; 3]) -> Option<()> {
         let row = |k: usize| dirs[k].get(first as usize..)?.first_chunk();
         self.dir = [*row(0)?, *row(1)?, *row(2)?];
@@ -90,7 +90,7 @@ impl Looks {
         self.count += 1;
     }
 
-    /// Tells what each of them sees: `BEHIND` everything, or of the whole room.
+    /// Passes the radiance of each ray to `tell`, and empties the batch: the background (`BEHIND`), or the whole room.
     fn tell<const BEHIND: bool>(&mut self, up: UpAxis, tell: &mut impl FnMut(u32, Vec3)) {
         Level::best().run(Look::<BEHIND> { looks: self, up });
         for i in 0..self.count.min(RAYS) {
@@ -108,7 +108,7 @@ struct Look<'a, const BEHIND: bool> {
 impl<const BEHIND: bool> Kernel for Look<'_, BEHIND> {
     type Output = ();
 
-    // The up axis is asked outside the loop, which then is a formula.
+    // The up axis is matched outside the loop, which is then branch-free.
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
         match self.up {
@@ -140,7 +140,7 @@ mod tests {
         for up in [UpAxis::Y, UpAxis::Z] {
             for environment in [Environment::Studio, Environment::Constant(Vec3::splat(0.3))] {
                 let sky = Sky::new(&Scene { environment, up, ..Scene::default() });
-                // Some so wide that they are blurred, and one without a direction.
+                // Some cones so wide that they are blurred, and one ray without a direction.
                 let mut rays: Vec<_> = (0..101).map(|i| (i, random.cube() * 3.0, i as f32 * 0.002)).collect();
                 rays[40].1 = Vec3::ZERO;
                 let mut seen = vec![None; rays.len()];

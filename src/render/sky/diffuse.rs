@@ -1,7 +1,7 @@
-//! The light of a panorama that a matt surface gathers, as a table of normals.
+//! Diffuse irradiance of a panorama, as a table over normals.
 //!
-//! A normal's sum is one over cells, each of which keeps the vector integral of its light, so that a sun shines from where it
-//! is and not from the middle of its cell.
+//! The sum of a normal is taken over cells, each of which keeps the vector integral of its light, so that a sun shines from its
+//! own direction and not from the middle of its cell.
 
 use super::lookups::{LOOKUPS, Lookups, Row, Taps};
 use super::panorama::{Level, Pyramid};
@@ -16,19 +16,19 @@ const TABLE: (u32, u32) = (128, 64);
 /// Columns and rows of the cells.
 const CELLS: (u32, u32) = (64, 32);
 
-/// Columns of places that a cell is asked at, and rows: all of them side by side.
+/// Columns and rows of sample places in a cell, looked up side by side.
 const FINER: u32 = 8;
 const _: () = assert!((FINER * FINER) as usize == LOOKUPS);
 
-/// Normals that are summed for at a time.
+/// Number of normals summed at a time.
 const NORMALS: usize = 2 * LANES;
 
-/// Mean radiance around each normal, weighted by the cosine to it.
+/// Cosine-weighted mean radiance around each normal.
 pub(super) fn table(sky: &Pyramid) -> Level {
     let cells = cells(sky);
     let table = Level::without_texels(TABLE);
     let middle = |row: u32, column: u32| table.direction(column as f32 + 0.5, row as f32 + 0.5);
-    // What an even light of 1 sums up to is the same all along a row.
+    // The sum of constant radiance 1 is the same all along a row.
     let even = cells.iter().map(|cell| [cell.even]).collect::<Vec<_>>();
     let wholes: Vec<f32> = (0..TABLE.1).map(|row| sums(&even, &[middle(row, 0)])[0][0]).collect();
     let light = cells.iter().map(|cell| cell.light).collect::<Vec<_>>();
@@ -44,7 +44,7 @@ pub(super) fn table(sky: &Pyramid) -> Level {
     table.made_of(texels)
 }
 
-/// A cell's vector integrals: of the light of each channel, and of an even light of 1.
+/// Vector integrals over a cell: of the light of each channel, and of constant radiance 1.
 #[derive(Clone, Copy)]
 struct Cell {
     light: [Vec3; 3],
@@ -77,13 +77,13 @@ fn cells(sky: &Pyramid) -> Vec<Cell> {
     places.into_par_iter().map(cell).collect()
 }
 
-/// Looks at all places of a cell.
+/// Looks up all places of a cell.
 struct Look<'a> {
     sky: &'a Pyramid,
-    /// Radians across a place.
+    /// Angle across a place, radians.
     angle: f32,
     lookups: Lookups,
-    /// Their directions, each as long as its solid angle, by axis.
+    /// Directions of the places, each as long as its solid angle, by axis.
     areas: [Row; 3],
 }
 
@@ -113,7 +113,7 @@ impl Kernel for Look<'_> {
     }
 }
 
-/// Of each of `N` lights that arrive as `from`, what falls on surfaces with these normals, [`NORMALS`] at most.
+/// Cosine-weighted sums of each of `N` lights, given as vector integrals `from`, at these normals ([`NORMALS`] at most).
 fn sums<const N: usize>(from: &[[Vec3; N]], normals: &[Vec3]) -> [[f32; NORMALS]; N] {
     simd::Level::best().run(Sums { from, normals })
 }

@@ -1,45 +1,46 @@
-//! Directions drawn where a panorama is bright.
+//! Importance sampling of a panorama by its brightness.
 //!
-//! A texel is drawn by its light and its area on the sphere, row first (M. Pharr, W. Jakob, G. Humphreys, "Physically Based
-//! Rendering", 3rd edition, 2016, section 14.2.4), and a direction evenly within it.
+//! A texel is drawn by its light times its solid angle, row first (M. Pharr, W. Jakob, G. Humphreys, "Physically Based
+//! Rendering", 3rd edition, 2016, section 14.2.4), and a direction uniformly within it.
 
 use super::panorama::Level;
 use crate::math::Vec3;
 use std::f32::consts::PI;
 
-/// Columns of the finest level that is told apart.
+/// Columns of the finest level that is sampled.
 pub(super) const COLUMNS: u32 = 1024;
 
-/// Of so many chances one is told where to begin to look for the one that a number falls on.
+/// Average number of entries between two entries of a search guide.
 const GUIDED: usize = 4;
 
-/// Share of the draws that go anywhere, so that what is dark is drawn too.
+/// Share of the draws that are uniform, so that dark parts are drawn too.
 pub(super) const EVEN: f64 = 0.1;
 
-/// The distribution.
+/// Distribution of directions over a panorama.
 #[derive(Clone, Debug)]
 pub(super) struct EnvironmentDistribution {
     level: Level,
-    /// Of rows, by the light of each.
+    /// Distribution over rows, by the light of each.
     rows: Sums,
-    /// Of the texels of each row, by the light of each in that of the row.
+    /// Distribution over the texels of each row, given the row.
     columns: Vec<Sums>,
-    /// Cosines from the zenith of the upper edges of rows, and of the lower edge of the last.
+    /// Cosines from the zenith of the upper edge of each row, and of the lower edge of the last.
     edges: Vec<f32>,
-    /// Densities of texels, 1/sr.
+    /// Probability density of each texel, 1/sr.
     densities: Vec<f32>,
 }
 
-/// Rising sums of the chances of some up to each.
+/// Cumulative sums of weights.
 #[derive(Clone, Debug)]
 struct Sums {
     up_to: Vec<f32>,
-    /// The first that numbers of each part of their range may fall on, a power of two of them, and the last of all.
+    /// Guide table: the first entry that numbers of each equal part of 0 … 1 may fall on, for a power of two of parts, and the
+    /// last entry at the end.
     first: Vec<u32>,
 }
 
 impl EnvironmentDistribution {
-    /// Of the light of a level, with an `even` share of draws that go anywhere.
+    /// Builds the distribution of a level's light, with an `even` share of uniform draws.
     #[expect(clippy::cast_possible_truncation, reason = "chances")]
     pub(super) fn new(level: Level, even: f64) -> Self {
         let (width, height) = (level.width as usize, level.height as usize);
@@ -76,19 +77,19 @@ impl EnvironmentDistribution {
         Self { level, rows: Sums::new(rows), columns, edges, densities }
     }
 
-    /// Radiance of the texel that a direction in the panorama's frame lies in, and the density of drawing that direction,
-    /// 1/sr. Mixed with its neighbours a sun would shine where it is hardly ever drawn.
+    /// Radiance of the texel that contains a direction of the panorama's frame, and the density of drawing that direction, 1/sr.
+    /// No filtering: mixed with its neighbours, a sun would shine where it is hardly ever drawn.
     pub(super) fn look(&self, dir: Vec3) -> (Vec3, f32) {
         let (column, row) = self.level.nearest(dir);
         let density = self.densities[row as usize * self.level.width as usize + column as usize];
         (self.level.texel(column, row), density)
     }
 
-    /// The direction of two numbers from 0 … 1, in the panorama's frame.
+    /// Direction drawn with two numbers from 0 … 1, in the panorama's frame.
     pub(super) fn draw(&self, [u, v]: [f32; 2]) -> Vec3 {
         let (row, down) = self.rows.pick(u);
         let (column, right) = self.columns[row].pick(v);
-        // Evenly by area: by the cosine from the zenith, not by the angle.
+        // Uniform in area: in the cosine from the zenith, not in the angle.
         let cosine = self.edges[row] + (self.edges[row + 1] - self.edges[row]) * down;
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
         let (sin, cos) = libm::sincosf(((column as f32 + right) / self.level.width as f32 - 0.5) * 2.0 * PI);
@@ -97,7 +98,7 @@ impl EnvironmentDistribution {
 }
 
 impl Sums {
-    /// Of at least one.
+    /// Builds the guide of at least one cumulative sum.
     #[expect(clippy::cast_possible_truncation, reason = "no side of a panorama has more texels")]
     fn new(up_to: Vec<f32>) -> Self {
         let last = up_to.len() - 1;
@@ -114,7 +115,7 @@ impl Sums {
         Self { up_to, first }
     }
 
-    /// Which of them a number from 0 … 1 falls on, and where on it, 0 … 1.
+    /// Index of the entry that a number from 0 … 1 falls on, and the position in it, 0 … 1.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "one of the parts")]
     fn pick(&self, number: f32) -> (usize, f32) {
         let (sums, last) = (&self.up_to, self.up_to.len() - 1);

@@ -1,4 +1,4 @@
-//! What a rough surface mirrors of a panorama, without a ray: lookups along the directions that its facets send the view to.
+//! Glossy reflections of a panorama without a ray: lookups along the directions in which microfacets mirror the view.
 
 use super::lookups::{LOOKUPS, Lookups, Row};
 use super::panorama::Pyramid;
@@ -10,15 +10,15 @@ use crate::render::sobol::mix;
 use std::f32::consts::PI;
 use std::sync::LazyLock;
 
-/// Width of the hills that stand for the lookups' shares of the sphere, in roots of those: as wide as they are apart.
+/// Filter width of a lookup, over the square root of its share of the sphere: as wide as lookups are apart.
 const HILL: f32 = 0.75;
 
-/// What draws their facets.
+/// Pattern that the microfacets are drawn with.
 static PATTERN: LazyLock<[Row; 3]> = LazyLock::new(|| pattern(0.0));
 
-/// Slopes along two axes of facets that stand for equal shares of a GGX distribution of width 1.
+/// Slopes along two axes of microfacets that stand for equal shares of a GGX distribution of width 1.
 static SLOPES: LazyLock<[Row; 2]> = LazyLock::new(|| {
-    /// The golden ratio's inverse: turns that never meet.
+    /// Inverse of the golden ratio: turns that never coincide.
     const GOLDEN: f32 = 0.618_034;
     let part = |k: usize| (k as f32 + 0.5) / LOOKUPS as f32;
     let slope = |k: usize, axis: f32| axis * (part(k) / (1.0 - part(k))).sqrt();
@@ -26,18 +26,18 @@ static SLOPES: LazyLock<[Row; 2]> = LazyLock::new(|| {
     [std::array::from_fn(|k| slope(k, turn(k).1)), std::array::from_fn(|k| slope(k, turn(k).0))]
 });
 
-/// How the pattern is turned and shifted for a point of a surface.
+/// Rotation and shift of the pattern at a point of a surface.
 #[derive(Clone, Copy)]
 struct Turn {
     /// Cosine and sine of the turn.
     around: [f32; 2],
-    /// Part of a share.
+    /// Shift, as a fraction of a share.
     shift: f32,
 }
 
 impl Turn {
-    /// The turn for a lobe seen from `view`, by all bits of both: what so few lookups miss of a small sun is noise then,
-    /// which more samples lessen and pixels know of, and no pattern on the surface.
+    /// Hashes the turn from all bits of a lobe and its `view`: the error of so few lookups at a small sun then is noise, which
+    /// more samples lessen and which pixels can estimate, and no pattern on the surface.
     fn of(lobe: &Lobe, view: Vec3) -> Self {
         let bits = [lobe.facet(view, [0.5; 2]), view].into_iter().flat_map(|v| v.to_array().map(f32::to_bits));
         let seed = bits.fold(0, mix);
@@ -48,7 +48,7 @@ impl Turn {
     }
 }
 
-/// Looks along where facets of `lobe` send `view`.
+/// Looks up the directions in which microfacets of `lobe` mirror `view`.
 struct Look<'a, F> {
     sky: &'a Pyramid,
     lobe: &'a Lobe,
@@ -60,12 +60,12 @@ struct Look<'a, F> {
 impl<F: Fn(Vec3) -> Vec3> Kernel for Look<'_, F> {
     type Output = Option<Vec3>;
 
-    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
+    // The lanes are plain arrays: the token `S` only tells which instructions the compiler may use.
     #[inline(always)]
     fn run<S: Simd>(self, _: S) -> Option<Vec3> {
         let Self { sky, lobe, view, turn: Turn { around: [c, s], shift }, to_map } = self;
         let (lobe, [at, cos, sin]) = (*lobe, &*PATTERN);
-        // Where they go, in the panorama's frame, by axis.
+        // Mirrored directions, in the panorama's frame, by axis.
         let mut dirs = [[0.0; LOOKUPS]; 3];
         let mut to = Lookups::NONE;
         for k in 0..LOOKUPS {
@@ -84,13 +84,13 @@ impl<F: Fn(Vec3) -> Vec3> Kernel for Look<'_, F> {
 }
 
 impl Pyramid {
-    /// Mean radiance in the lobe of a rough mirror that sends the view along `dir`, seen along its own normal.
+    /// Mean radiance in the lobe of a rough mirror that sends the view along `dir`, viewed along its own normal.
     ///
-    /// Directions are drawn from the GGX distribution, each looked up as blurred as directions are few there (J. Křivánek,
-    /// M. Colbert, "Real-time Shading with Filtered Importance Sampling", 2008).
+    /// Directions are drawn from the GGX distribution, each looked up with a blur that matches the local sample density (J.
+    /// Křivánek, M. Colbert, "Real-time Shading with Filtered Importance Sampling", 2008).
     pub(super) fn blurred(&self, dir: Vec3, roughness: f32) -> Vec3 {
         let alpha = roughness * roughness;
-        // Narrower than a texel is not blurred.
+        // A lobe narrower than a texel is not blurred.
         if 2.0 * alpha < self.finest() {
             return self.radiance(dir, 0.0);
         }
@@ -98,12 +98,12 @@ impl Pyramid {
         mean.unwrap_or_else(|| self.radiance(dir, PI))
     }
 
-    /// Mean radiance as facets of `lobe` that are seen from `view` mirror it and others let it through; `to_map` turns
-    /// directions into those of the panorama. `None` where the lobe is narrower than a texel, or shows nothing.
+    /// Mean radiance that microfacets of `lobe` mirror to `view`, masking and shadowing included; `to_map` turns directions into
+    /// the panorama's frame. `None` where the lobe is narrower than a texel, or no facet mirrors anything.
     ///
-    /// Facets are drawn as they are seen, and each direction is looked up as blurred as directions are few there
+    /// Facets are drawn by their visible area, and each direction is looked up with a blur that matches the local sample density
     /// (J. Křivánek, M. Colbert, "Real-time Shading with Filtered Importance Sampling", 2008). A table of lobes around the
-    /// mirrored direction, as games have it, is another lobe: on rough surfaces it shows a small sun a quarter wrong.
+    /// mirrored direction, as in games, has another shape: on rough surfaces it shows a small sun with an error of a quarter.
     pub(super) fn mirrored(&self, lobe: &Lobe, view: Vec3, to_map: impl Fn(Vec3) -> Vec3) -> Option<Vec3> {
         if lobe.angle(1) < self.finest() {
             return None;
@@ -112,7 +112,7 @@ impl Pyramid {
     }
 }
 
-/// Looks around a direction, as widely as facets of this width spread what is seen along their normal.
+/// Looks up directions around `dir`, as widely as facets of width `alpha` spread the view along their normal.
 struct LookAround<'a> {
     sky: &'a Pyramid,
     dir: Vec3,
@@ -135,7 +135,7 @@ impl Kernel for LookAround<'_> {
             let half = (dir + tangent * x + bitangent * y) * cosine;
             let light = half * (2.0 * cosine) - dir;
             to.weight[k] = light.dot(dir).max(0.0);
-            // Each stands for an equal share of the lobe: as much of the sphere as the distribution is thin there.
+            // Each lookup stands for an equal share of the lobe: the thinner the distribution, the larger its part of the sphere.
             let f = cosine * cosine * (alpha * alpha - 1.0) + 1.0;
             let density = alpha * alpha / (PI * f * f) / 4.0;
             to.angle[k] = (1.0 / (LOOKUPS as f32 * density)).sqrt();
@@ -162,7 +162,7 @@ mod tests {
         Pyramid::new(&Panorama { name: String::new(), width, height, texels: Arc::new(texels), ..Panorama::default() })
     }
 
-    /// A gradient and a sun, 3° wide, that lights as much as all the rest.
+    /// A gradient and a sun, 3° wide, that gives as much light as all the rest.
     fn sunny() -> Pyramid {
         let sun = Vec3::new(0.55, 0.62, 0.45).normalize();
         pyramid(|dir| {
@@ -172,7 +172,7 @@ mod tests {
         })
     }
 
-    /// The mean over the lobe by all texels.
+    /// Mean over the lobe, summed over all texels.
     fn integral(sky: &Pyramid, lobe: &Lobe, normal: Vec3, view: Vec3) -> f32 {
         let grid = Level::without_texels(SIZE);
         let (mut sum, mut total) = (0.0, 0.0);
@@ -185,7 +185,7 @@ mod tests {
         (sum / total) as f32
     }
 
-    /// Normals that are seen from +z, all around and to 72°.
+    /// Normals seen from +z, all around and up to 72° off.
     fn normals() -> impl Iterator<Item = Vec3> {
         (0..48u8).map(|k| {
             let (sin, cos) = libm::sincosf(f32::from(k) * 2.4);
@@ -209,7 +209,7 @@ mod tests {
     fn what_lookups_miss_of_a_small_sun_is_lessened_by_more_samples_around() {
         let sky = sunny();
         let mut worst = 0.0_f32;
-        // Where the sun is seen in the lobe.
+        // Normals whose lobe contains the sun.
         for normal in normals().filter(|n| n.dot(Vec3::new(0.55, 0.62, 1.45).normalize()) > 0.9) {
             let samples = (0..64u8).map(|k| {
                 let (sin, cos) = libm::sincosf(f32::from(k));

@@ -1,8 +1,8 @@
-//! The hotspot: the small and bright part of a panorama, a sun as a rule, which few of the rays that rough surfaces spread
-//! would meet.
+//! The hotspot: the small and bright part of a panorama, usually a sun, which few of the rays that rough surfaces spread would
+//! hit.
 //!
-//! What a panorama has beyond a cap that all of it but a small part stays below is drawn by its light; the rest is calm, and seen
-//! by rays that go anywhere.
+//! Light above a cap that only a small part of the panorama exceeds is importance-sampled; the rest is calm, and seen by rays in
+//! any direction.
 
 use super::Sky;
 use super::distribution::{COLUMNS, EnvironmentDistribution};
@@ -10,26 +10,26 @@ use super::panorama::Pyramid;
 use crate::math::Vec3;
 use std::f64::consts::PI;
 
-/// So much of the sphere lies beyond the cap at most, sr: a sun with what shines around it, 9° across.
+/// Largest solid angle above the cap, sr: a sun with its halo, 9° across.
 const MOST: f32 = 0.02;
 
-/// What a hotspot must have of all the light to be worth rays of its own.
+/// Smallest share of all light at which a hotspot is worth rays of its own.
 const LEAST: f64 = 0.01;
 
 #[derive(Clone, Debug)]
 pub(super) struct Hotspot {
-    /// What lies below the cap.
+    /// The panorama clamped to the cap.
     without: Pyramid,
-    /// Of what lies beyond.
+    /// Distribution of the light above the cap.
     distribution: EnvironmentDistribution,
-    /// How much of the sphere an even light would cover that is as bright and as much, sr.
+    /// Effective solid angle, sr: that of a uniform light with the same power and mean square.
     area: f32,
-    /// Mean over the sphere of the greatest channel of what is calm.
+    /// Mean over the sphere of the greatest channel of the calm rest.
     mean_without: f32,
 }
 
 impl Hotspot {
-    /// The hotspot of a panorama, if it has one.
+    /// Finds the hotspot of a panorama, if it has one.
     pub(super) fn of(pyramid: &Pyramid) -> Option<Self> {
         let level = pyramid.at_most(COLUMNS);
         let mut each: Vec<(Vec3, f32)> = level.each().collect();
@@ -44,7 +44,7 @@ impl Hotspot {
         }
         let capped = |light: Vec3| if light.max_element() > cap { light * (cap / light.max_element()) } else { light };
         let beyond = |light: Vec3| light - capped(light);
-        // Squares of what is very bright or dim are no single floats.
+        // Squares of very bright or dim values overflow or underflow single precision.
         let sum = |light: Vec3| f64::from(light.element_sum());
         let sum_of = |part: &dyn Fn(Vec3) -> f64| -> f64 {
             level.each().map(|(light, area)| part(light) * f64::from(area)).sum()
@@ -66,7 +66,7 @@ impl Hotspot {
 }
 
 impl Sky {
-    /// Finds the hotspot of a picture, for surfaces that spread rays.
+    /// Finds the hotspot of a panorama, for surfaces that spread rays.
     pub(crate) fn find_hotspot(&mut self) {
         if let Some(map) = &mut self.map {
             map.seeks_hotspot = true;
@@ -74,21 +74,21 @@ impl Sky {
         }
     }
 
-    /// How much of the sphere the hotspot covers, sr, were it even; `None`: there is none.
+    /// Effective solid angle of the hotspot, sr; `None`: there is none.
     pub(crate) fn hotspot(&self) -> Option<f32> {
         self.map.as_ref().and_then(|map| map.hotspot()).map(|hotspot| hotspot.area)
     }
 
-    /// Whether light is worth a ray to the hotspot that adds it, where what weighs less than `cutoff` is not: beside what
-    /// is calm.
+    /// Whether a ray to the hotspot is worth it for its contribution `light`, compared with the calm rest, given the weight
+    /// `cutoff` below which rays are dropped.
     pub(crate) fn is_worth_a_ray(&self, light: Vec3, cutoff: f32) -> bool {
-        /// Much less than a weight, as suns are bright.
+        /// Much less than 1, as suns are bright.
         const PART: f32 = 1.0 / 16.0;
         let calm = self.map.as_ref().and_then(|map| map.hotspot()).map_or(0.0, |hotspot| hotspot.mean_without);
         light.max_element() > PART * cutoff * calm
     }
 
-    /// A direction to the hotspot, drawn with two numbers from 0 … 1, and its radiance over the density of drawing it.
+    /// Direction to the hotspot, drawn with two numbers from 0 … 1, and its radiance over the density of drawing it.
     pub(crate) fn to_hotspot(&self, at: [f32; 2]) -> Option<(Vec3, Vec3)> {
         let map = self.map.as_ref()?;
         let distribution = &map.hotspot()?.distribution;
@@ -97,7 +97,7 @@ impl Sky {
         (density > 0.0).then(|| (self.to_world(map, dir), radiance / density))
     }
 
-    /// Radiance along a unit direction without the hotspot, averaged over a cone of this angle across (radians).
+    /// Radiance along a unit direction without the hotspot, averaged over a cone this many radians across.
     pub(crate) fn without_hotspot(&self, dir: Vec3, angle: f32) -> Vec3 {
         match self.map.as_ref().and_then(|map| map.hotspot().map(|hotspot| (map, hotspot))) {
             Some((map, hotspot)) => hotspot.without.radiance(self.to_map(map, dir), angle),
@@ -113,7 +113,7 @@ mod tests {
     use crate::scene::{Environment, Panorama, Scene};
     use std::sync::Arc;
 
-    /// A sky that is darker below, and a sun so many degrees across.
+    /// A sky that is darker below, with a sun so many degrees across.
     fn sky(degrees: f32, strength: f32) -> Sky {
         let (width, height) = (512, 256);
         let sun = Vec3::new(0.55, 0.62, 0.45).normalize();

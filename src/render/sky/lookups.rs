@@ -1,41 +1,41 @@
-//! Lookups of a panorama, each as blurred as it asks for, many side by side.
+//! Filtered lookups of a panorama, many side by side, each with its own blur.
 
 use super::panorama::{Level, coordinates};
 use crate::math::formula::{floor, log2, near_integer};
 use crate::math::{Vec3, Vec4};
 
-/// Lookups side by side.
+/// Number of lookups side by side.
 pub(super) const LOOKUPS: usize = 64;
 
-/// A number of every lookup.
+/// One value of every lookup.
 pub(super) type Row<T = f32> = [T; LOOKUPS];
 
-/// Where lookups go.
+/// Coordinates, widths and weights of lookups.
 pub(super) struct Lookups {
-    /// Their places, both 0 … 1: once around, and from the zenith down.
+    /// Coordinates, both 0 … 1: around the horizon, and from the zenith down.
     pub around: Row,
     pub down: Row,
-    /// Radians across what each is the mean of.
+    /// Filter width of each lookup, radians across.
     pub angle: Row,
-    /// How much each counts; 0 for those that do not.
+    /// Weight of each lookup; 0 for unused lanes.
     pub weight: Row,
 }
 
-/// What lookups read of one copy each.
+/// Texels and weights of each lookup in one mip level.
 pub(super) struct Taps {
-    /// The numbers of the four texels around each place: two of the upper row, and two of the lower.
+    /// Indices of the four texels around each place: two of the upper row, then two of the lower.
     texels: [Row<u32>; 4],
-    /// How far the place lies beyond the first, in texels, to the right and down.
+    /// Offset of the place from the first texel, in texels, to the right and down.
     right: Row,
     down: Row,
 }
 
 impl Lookups {
-    /// None that counts.
+    /// No lookups: all weights are 0.
     pub(super) const NONE: Self =
         Self { around: [0.0; LOOKUPS], down: [0.0; LOOKUPS], angle: [0.0; LOOKUPS], weight: [0.0; LOOKUPS] };
 
-    /// Sets their places by unit directions in the panorama's frame, by axis. For a kernel.
+    /// Sets the coordinates from unit directions in the panorama's frame, given by axis. For a kernel.
     #[inline(always)]
     pub(super) fn look_along(&mut self, [x, y, z]: &[Row; 3]) {
         for k in 0..LOOKUPS {
@@ -43,8 +43,8 @@ impl Lookups {
         }
     }
 
-    /// Mean of all that count, each between the two of some `copies` whose texels are next to its width; `None` where none
-    /// counts. For a kernel.
+    /// Weighted mean of all lookups, each interpolated between the two of the mip levels `copies` next to its width; `None` where
+    /// all weights are 0. For a kernel.
     #[inline(always)]
     #[expect(clippy::cast_precision_loss, reason = "a few copies")]
     pub(super) fn mean(&self, copies: &[Level]) -> Option<Vec3> {
@@ -78,8 +78,8 @@ impl Lookups {
 impl Taps {
     pub(super) const NONE: Self = Self { texels: [[0; LOOKUPS]; 4], right: [0.0; LOOKUPS], down: [0.0; LOOKUPS] };
 
-    /// Of the copies with these numbers: the whole is `width` × `height`, and each half as large as the one before. Without
-    /// branches and casts, of which compilers make no lanes.
+    /// Finds the texels in the mip levels with these numbers: level 0 is `width` × `height`, each next half as large. Without
+    /// branches and casts, which keep compilers from vectorising.
     #[inline(always)]
     #[expect(clippy::cast_precision_loss, reason = "sides are below 2²²")]
     #[expect(clippy::needless_range_loop, reason = "of several arrays, side by side")]
@@ -90,15 +90,15 @@ impl Taps {
             let (x, y) = (lookups.around[k] * wide as f32 - 0.5, lookups.down[k] * high as f32 - 0.5);
             let (left, top) = (floor(x), floor(y));
             (self.right[k], self.down[k]) = (x - left, y - top);
-            // A column, or one before; a row, or one before.
+            // Left column and upper row; both may be -1.
             let (column, row) = (near_integer(left), near_integer(top));
-            // No more than a turn beyond, and once more for the half turn behind a pole.
+            // At most one turn beyond, and once more for the half turn behind a pole.
             let around = |column: i32| if column >= wide { column - wide } else { column };
             let first = around(if column < 0 { column + wide } else { column });
             let second = around(first + 1);
             for j in 0..2 {
                 let row = row + j;
-                // Beyond a pole lies the same row, half a turn on.
+                // Beyond a pole lies the same row, half a turn away.
                 let over = (row < 0) | (row >= high);
                 let turn = if over { wide >> 1 } else { 0 };
                 let row = if row < 0 { 0 } else { row };
@@ -110,11 +110,11 @@ impl Taps {
         }
     }
 
-    /// What lookup k reads of its copy.
+    /// Bilinear value of lookup k in its mip level.
     #[inline(always)]
     pub(super) fn read(&self, k: usize, texels: &[[f32; 3]]) -> Vec4 {
         let texel = |place: usize| {
-            // What is no place at all has none.
+            // Texels out of range read as black.
             let [x, y, z] = texels.get(self.texels[place][k] as usize).copied().unwrap_or_default();
             Vec4::new(x, y, z, 0.0)
         };
@@ -148,7 +148,7 @@ mod tests {
         }
     }
 
-    /// One lookup by its definition: between the two copies whose texels are next to its width.
+    /// One lookup by its definition: interpolated between the two mip levels next to its width.
     fn defined(sky: &Pyramid, at: (f32, f32), angle: f32) -> Vec3 {
         let last = sky.soft.len() - 1;
         let level = log2((angle / sky.finest()).max(1.0)).min(last as f32);
@@ -165,7 +165,7 @@ mod tests {
                 let mut lookups = Lookups::NONE;
                 let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
                 for k in 0..LOOKUPS {
-                    // All around, and the very edges.
+                    // All around, and exactly on the edges.
                     let place = |unit: f32| if unit < 0.1 { (unit * 20.0).floor() } else { unit };
                     (lookups.around[k], lookups.down[k]) = (place(random.unit()), place(random.unit()));
                     lookups.angle[k] = sky.finest() * (random.unit() * 10.0 - 1.0).exp2();

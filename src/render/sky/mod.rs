@@ -1,4 +1,4 @@
-//! What rays that leave the scene see, and what arrives from there without a ray.
+//! Radiance of the environment: along rays that leave the scene, and gathered without a ray.
 
 mod beyond;
 mod diffuse;
@@ -19,41 +19,41 @@ use hotspot::Hotspot;
 use panorama::Pyramid;
 use std::sync::{Arc, OnceLock};
 
-/// Angle across of cones, radians, from which the studio is blurred, little by little up to twice that: where smooth surfaces
-/// spread rays so far that they stand for much of it.
+/// Cone angle, radians across, from which the studio is blurred, gradually up to twice that: where smooth surfaces spread rays so
+/// far that each stands for much of the room.
 const WIDE: f32 = 0.1;
 
-/// The environment of a scene, asked with world directions.
+/// Environment of a scene, looked up with world directions.
 #[derive(Clone, Debug)]
 pub(crate) struct Sky {
     environment: Environment,
     up: UpAxis,
-    /// What secondary rays see of a scene without an environment: the background colour, as the founding texts say.
+    /// Radiance that secondary rays see in a scene without an environment: the background colour, as in the founding texts.
     backdrop: Vec3,
-    /// Whether what is behind everything looks as the usual tone curve makes it: pictures in which nothing answers to light
-    /// have none, and stand before the same walls as others.
+    /// Whether the background has the usual tone curve applied: pictures of scenes without lighting have none, and stand before
+    /// the same walls as others.
     is_toned: bool,
-    /// How many times as bright as they are the walls of the studio are behind everything.
+    /// Factor on the radiance of the studio's walls in the background.
     walls: f32,
     map: Option<Map>,
 }
 
-/// A picture of the surroundings, ready to be asked.
+/// A panorama, ready for lookups.
 #[derive(Clone, Debug)]
 struct Map {
     tables: Arc<Tables>,
-    /// Whether its hotspot is told apart.
+    /// Whether its hotspot is sampled separately.
     seeks_hotspot: bool,
     /// Sine and cosine of its rotation about the up axis.
     turn: (f32, f32),
 }
 
-/// What lookups and draws in a panorama need, however it is turned.
+/// Tables for lookups and draws in a panorama, independent of its rotation.
 #[derive(Debug)]
 struct Tables {
     pyramid: Pyramid,
     distribution: EnvironmentDistribution,
-    /// Found when it is first asked for.
+    /// Computed on first use.
     hotspot: OnceLock<Option<Hotspot>>,
 }
 
@@ -65,7 +65,8 @@ impl Tables {
         Self { pyramid, distribution, hotspot: OnceLock::new() }
     }
 
-    /// Found by each thread that asks before it is known: none waits for another, which could be at work for the one that waits.
+    /// Hotspot, computed by each thread that needs it before it is known: waiting for another thread could deadlock, as that one
+    /// may be at work for the waiting one.
     fn hotspot(&self) -> Option<&Hotspot> {
         if self.hotspot.get().is_none() {
             let found = Hotspot::of(&self.pyramid);
@@ -74,7 +75,7 @@ impl Tables {
         self.hotspot.get().and_then(Option::as_ref)
     }
 
-    /// Those that an earlier picture has left with the panorama, if they are of these texels.
+    /// Tables that an earlier picture has cached with the panorama, if they were made of the same texels; else new ones.
     fn of_prepared(panorama: &Panorama) -> Arc<Self> {
         let kept = panorama.prepared.get_or_make(|| Self::of(panorama));
         kept.filter(|kept| kept.pyramid.is_of(panorama)).unwrap_or_else(|| Arc::new(Self::of(panorama)))
@@ -82,7 +83,7 @@ impl Tables {
 }
 
 impl Map {
-    /// If it has any, and that was asked for.
+    /// Hotspot, if there is one and it was requested.
     fn hotspot(&self) -> Option<&Hotspot> {
         self.seeks_hotspot.then(|| self.tables.hotspot()).flatten()
     }
@@ -100,12 +101,12 @@ impl Sky {
         Self { environment: scene.environment, up: scene.up, backdrop, is_toned, walls: 1.0, map }
     }
 
-    /// This sky with walls so many times as bright behind everything.
+    /// Replaces the brightness factor of the walls in the background.
     pub(crate) fn before_walls(self, walls: f32) -> Self {
         Self { walls, ..self }
     }
 
-    /// Whether nothing comes from anywhere.
+    /// Whether the environment gives no light at all.
     pub(crate) fn is_dark(&self) -> bool {
         match self.environment {
             Environment::Black => self.backdrop == Vec3::ZERO,
@@ -114,21 +115,21 @@ impl Sky {
         }
     }
 
-    /// Whether it is a picture.
+    /// Whether the environment is a panorama.
     pub(crate) fn is_map(&self) -> bool {
         self.map.is_some()
     }
 
-    /// The up axis of the studio, if that is what surrounds the scene; else, but for pictures, every direction is alike.
+    /// Up axis of the studio, if that is the environment; without one, and unless it is a panorama, all directions look alike.
     pub(crate) fn studio(&self) -> Option<UpAxis> {
         (self.environment == Environment::Studio).then_some(self.up)
     }
 
-    /// Radiance along a unit direction, averaged over a cone of this angle across (radians).
+    /// Radiance along a unit direction, averaged over a cone this many radians across.
     pub(crate) fn radiance(&self, dir: Vec3, angle: f32) -> Vec3 {
         match (self.environment, &self.map) {
             (Environment::Constant(radiance), _) => radiance,
-            // A cone as wide as rough facets spread one.
+            // A cone as wide as the lobe of rough facets.
             (Environment::Studio, _) if angle > WIDE => {
                 let spread = 0.5 * angle * (angle / WIDE - 1.0).min(1.0);
                 studio::blurred(studio::from_world(self.up, dir), spread.min(1.0).sqrt())
@@ -139,20 +140,20 @@ impl Sky {
         }
     }
 
-    /// What is behind everything along a unit direction in which the eye looks, averaged over such a cone: the same, but of the
-    /// studio its walls alone.
+    /// Background along a unit direction from the eye, averaged over such a cone: as [`Self::radiance`], but only the walls of
+    /// the studio.
     pub(crate) fn behind(&self, dir: Vec3, angle: f32) -> Vec3 {
         let walls = |up| self.toned(studio::backdrop(studio::from_world(up, dir)));
         self.studio().map_or_else(|| self.radiance(dir, angle), walls)
     }
 
-    /// A wall of the studio as it is to look behind everything.
+    /// Radiance of a wall of the studio as it shows in the background.
     #[inline(always)]
     fn toned(&self, wall: Vec3) -> Vec3 {
         self.walls * if self.is_toned { ToneMap::default().map(wall.to_array()).into() } else { wall }
     }
 
-    /// Mean radiance around a mirror direction, as wide as `roughness` (0 … 1) makes it.
+    /// Mean radiance around a mirror direction, over the lobe of this `roughness` (0 … 1).
     pub(crate) fn blurred(&self, dir: Vec3, roughness: f32) -> Vec3 {
         match (self.environment, &self.map) {
             (Environment::Studio, _) => studio::blurred(studio::from_world(self.up, dir), roughness),
@@ -161,8 +162,8 @@ impl Sky {
         }
     }
 
-    /// Mean radiance as the facets of a rough mirror show it, seen as said: of a picture by the very facets that are seen,
-    /// else around the mirrored direction.
+    /// Mean radiance mirrored by the facets of a rough mirror: for a panorama by the visible facets themselves, else blurred
+    /// around the mirrored direction.
     pub(crate) fn mirrored(&self, seen: &ShadingFrame, roughness: f32) -> Vec3 {
         let exact = self.map.as_ref().and_then(|map| {
             let lobe = Lobe::even(seen.normal, roughness * roughness);
@@ -181,12 +182,12 @@ impl Sky {
         }
     }
 
-    /// A direction to look in for light, drawn with two numbers from 0 … 1; `None` where no direction is better than others.
+    /// Direction of a light sample, drawn with two numbers from 0 … 1; `None` where no direction is better than others.
     pub(crate) fn draw(&self, at: [f32; 2]) -> Option<Vec3> {
         self.map.as_ref().map(|map| self.to_world(map, map.tables.distribution.draw(at)))
     }
 
-    /// Radiance as [`Self::draw`] knows it, and the density of drawing this direction, 1/sr.
+    /// Radiance as seen by samples of [`Self::draw`], and the density of drawing this direction, 1/sr.
     pub(crate) fn drawn(&self, dir: Vec3) -> (Vec3, f32) {
         self.map
             .as_ref()

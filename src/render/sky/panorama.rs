@@ -1,4 +1,4 @@
-//! A panorama and smaller copies of it, asked for its radiance at any blur.
+//! A panorama and its mip levels, looked up at any blur.
 
 use super::diffuse;
 use crate::math::Vec3;
@@ -8,17 +8,16 @@ use rayon::prelude::*;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-/// The levels of a panorama, each half as large as the one before.
+/// Mip levels of a panorama, each half as large as the one before.
 #[derive(Clone, Debug)]
 pub(super) struct Pyramid {
     pub levels: Vec<Level>,
-    /// The first again, and the other sizes, each a smooth mean of the one before: a small sun stays where it is in all of
-    /// them.
+    /// The same sizes, each but the first a tent-filtered mean of the one before: a small sun keeps its position in all of them.
     pub soft: Vec<Level>,
     diffuse: Level,
 }
 
-/// One copy.
+/// One mip level.
 #[derive(Clone, Debug)]
 pub(super) struct Level {
     pub width: u32,
@@ -27,7 +26,7 @@ pub(super) struct Level {
 }
 
 impl Pyramid {
-    /// Of a panorama that has texels.
+    /// Builds the levels of a panorama that has texels.
     pub(super) fn new(panorama: &Panorama) -> Self {
         let Panorama { width, height, texels, .. } = panorama;
         let levels = Level { width: *width, height: *height, texels: Arc::clone(texels) }.halves();
@@ -47,32 +46,32 @@ impl Pyramid {
         (*width, *height) == (panorama.width, panorama.height) && Arc::ptr_eq(texels, &panorama.texels)
     }
 
-    /// For [`Self::radiance`] alone.
+    /// Builds the levels for [`Self::radiance`] alone.
     pub(super) fn sharp(level: Level) -> Self {
         let nothing = Level { width: 1, height: 1, texels: Arc::new(vec![[0.0; 3]]) };
         Self { levels: level.halves(), soft: Vec::new(), diffuse: nothing }
     }
 
-    /// Radians across a texel.
+    /// Angle across a texel of the finest level, radians.
     pub(super) fn finest(&self) -> f32 {
         self.levels[0].angle()
     }
 
-    /// The finest level with at most so many columns.
+    /// Finest level with at most `columns` columns.
     pub(super) fn at_most(&self, columns: u32) -> &Level {
         let last = self.levels.len() - 1;
         &self.levels[self.levels.iter().position(|level| level.width <= columns).unwrap_or(last)]
     }
 
-    /// Mean radiance in a cone of this angle across.
+    /// Mean radiance in a cone `angle` radians across.
     pub(super) fn radiance(&self, dir: Vec3, angle: f32) -> Vec3 {
         let ((fine, part), at) = (self.level(angle), coordinates(dir));
         let sharp = self.copy(fine).at(at);
         if part == 0.0 { sharp } else { sharp.lerp(self.copy(fine + 1).at(at), part) }
     }
 
-    /// The copy whose texels are as wide as a cone of this angle or the next finer, and how far it is from there to the one
-    /// after it.
+    /// Index of the mip level whose texels are as wide as a cone of this angle or the next finer, and the interpolation weight of
+    /// the level after it.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the levels there are")]
     pub(super) fn level(&self, angle: f32) -> (usize, f32) {
         let finest = self.finest();
@@ -81,7 +80,7 @@ impl Pyramid {
         (level as usize, level - (level as usize) as f32)
     }
 
-    /// A copy by its number, the last for those beyond.
+    /// Mip level by index, clamped to the last.
     pub(super) fn copy(&self, number: usize) -> &Level {
         &self.levels[number.min(self.levels.len() - 1)]
     }
@@ -92,7 +91,7 @@ impl Pyramid {
     }
 }
 
-/// Where a direction is in a panorama: 0 … 1 once around, and 0 … 1 from the zenith down.
+/// Coordinates of a direction in a panorama: 0 … 1 around the horizon, and 0 … 1 from the zenith down.
 #[inline(always)]
 pub(super) fn coordinates(dir: Vec3) -> (f32, f32) {
     let around = atan2(dir.z, dir.x) / (2.0 * PI) + 0.5;
@@ -101,17 +100,17 @@ pub(super) fn coordinates(dir: Vec3) -> (f32, f32) {
 }
 
 impl Level {
-    /// The places of a copy alone.
+    /// A level of this size without texels, for its geometry.
     pub(super) fn without_texels((width, height): (u32, u32)) -> Self {
         Self { width, height, texels: Arc::default() }
     }
 
-    /// A panorama of the same size with these texels, row by row.
+    /// This level with other texels, row by row.
     pub(super) fn made_of(self, texels: Vec<[f32; 3]>) -> Self {
         Self { texels: Arc::new(texels), ..self }
     }
 
-    /// It and all that are half as large as the one before.
+    /// This level and all smaller ones, each half as large as the one before.
     fn halves(self) -> Vec<Self> {
         std::iter::successors(Some(self), Self::halved).collect()
     }
@@ -122,23 +121,23 @@ impl Level {
         (0..self.height).flat_map(row)
     }
 
-    /// A panorama of the same size with other texels.
+    /// This level with each texel mapped.
     pub(super) fn with(&self, texel: impl Fn(Vec3) -> Vec3) -> Self {
         let texels = self.texels.iter().map(|&light| texel(light.into()).to_array()).collect();
         Self { texels: Arc::new(texels), ..*self }
     }
 
-    /// Degrees of arc, in radians, that a texel is high.
+    /// Height of a texel as an angle, radians.
     pub(super) fn angle(&self) -> f32 {
         PI / self.height as f32
     }
 
-    /// Solid angle of a texel in this row.
+    /// Solid angle of a texel in this row, sr.
     pub(super) fn area(&self, row: u32) -> f32 {
         self.area_between(f64::from(row), f64::from(row + 1))
     }
 
-    /// Solid angle of what is as wide as a texel and reaches from here to there, in rows.
+    /// Solid angle of a strip as wide as a texel, between two rows (fractional).
     fn area_between(&self, from: f64, to: f64) -> f32 {
         let edge = |row: f64| libm::cos(std::f64::consts::PI * row / f64::from(self.height));
         #[expect(clippy::cast_possible_truncation, reason = "an area of the unit sphere")]
@@ -157,7 +156,7 @@ impl Level {
         self.texels.get(i).map_or(Vec3::ZERO, |&texel| Vec3::from(texel))
     }
 
-    /// The texel that a direction lies in.
+    /// Column and row of the texel that contains a direction.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the texels there are")]
     pub(super) fn nearest(&self, dir: Vec3) -> (u32, u32) {
         let (x, y) = coordinates(dir);
@@ -165,7 +164,7 @@ impl Level {
         ((x as u32).min(self.width - 1), (y as u32).min(self.height - 1))
     }
 
-    /// The unit direction at these coordinates.
+    /// Unit direction at these coordinates, in texels.
     pub(super) fn direction(&self, x: f32, y: f32) -> Vec3 {
         let (sin, cos) = libm::sincosf((x / self.width as f32 - 0.5) * 2.0 * PI);
         let (sin_down, cos_down) = libm::sincosf(y / self.height as f32 * PI);
@@ -179,18 +178,18 @@ impl Level {
         (0..self.height).flat_map(row)
     }
 
-    /// Between the four nearest texels of a place, both its coordinates 0 … 1.
+    /// Bilinear interpolation at a place, both coordinates 0 … 1.
     pub(super) fn at(&self, (x, y): (f32, f32)) -> Vec3 {
         let (width, height) = (self.width.cast_signed(), self.height.cast_signed());
         let (x, y) = (x * self.width as f32 - 0.5, y * self.height as f32 - 0.5);
         let (left, top) = (floor_of_one(x), floor_of_one(y));
         #[expect(clippy::cast_possible_truncation, reason = "a column and a row, or one before")]
         let (column, row) = (left as i32, top as i32);
-        // No more than a turn beyond.
+        // At most one turn beyond.
         let around = |column: i32| if column >= width { column - width } else { column };
         let near = around(if column < 0 { column + width } else { column });
         let mixed = |row: i32| {
-            // Beyond a pole lies the same row, half a turn on.
+            // Beyond a pole lies the same row, half a turn away.
             let (row, turn) = match row {
                 ..0 => (0, width / 2),
                 row if row >= height => (height - 1, width / 2),
@@ -202,13 +201,13 @@ impl Level {
         mixed(row).lerp(mixed(row + 1), y - top)
     }
 
-    /// Smaller, each texel the mean of those around it by their area and by how near they are: light goes to the texels
-    /// that it would be mixed from, so that its middle stays where it is.
+    /// Downscales with a tent filter, weighted by solid angle: light goes to the texels that it would be interpolated from, so
+    /// that its centroid stays in place.
     fn softened(&self, (width, height): (u32, u32)) -> Self {
         let taps = |i: u32, from: u32, to: u32| {
             let step = from as f32 / to as f32;
             let middle = (i as f32 + 0.5) * step - 0.5;
-            // Those at both ends may have no share.
+            // Taps at both ends may have no weight.
             #[expect(clippy::cast_possible_truncation, reason = "texels of a side")]
             let within = (middle - step).ceil() as i32..=(middle + step).floor() as i32;
             let share = move |k: i32| (1.0 - (k as f32 - middle).abs() / step).max(0.0);
@@ -217,7 +216,7 @@ impl Level {
         let around = |k: i32| k.rem_euclid(self.width.cast_signed()).cast_unsigned();
         let columns: Vec<_> = (0..width).map(|x| taps(x, self.width, width)).collect();
         let row = |y: u32| {
-            // Beyond a pole lies the same row, half a turn on.
+            // Beyond a pole lies the same row, half a turn away.
             let over = |k: i32| match k {
                 k if k < 0 => ((-1 - k).cast_unsigned().min(self.height - 1), self.width / 2),
                 k => match (self.height - 1).checked_sub(k.cast_unsigned()) {
@@ -243,7 +242,7 @@ impl Level {
         Self { width, height, texels: Arc::new(texels) }
     }
 
-    /// Half as large, each texel the mean of those it covers by their area on the sphere; `None` for a single texel.
+    /// Half as large, each texel the mean of those it covers by solid angle; `None` for a single texel.
     fn halved(&self) -> Option<Self> {
         if self.width <= 1 && self.height <= 1 {
             return None;
@@ -272,7 +271,7 @@ impl Level {
     }
 }
 
-/// Of a side of so many texels that becomes one of `to`: those that texel `i` covers, and from where to where it does.
+/// Source texels, of `from` in a row, that texel `i` of `to` covers, each with the ends of the covered interval.
 #[expect(clippy::cast_possible_truncation, reason = "texels of a side")]
 fn covered(i: u32, from: u32, to: u32) -> impl Iterator<Item = (u32, f64, f64)> {
     let edge = move |i: u32| u64::from(i) * u64::from(from);
@@ -316,7 +315,7 @@ mod tests {
     fn smaller_copies_of_any_size_have_the_light_of_their_places() {
         let light =
             |dir: Vec3| Vec3::new(1.0 + 0.6 * dir.x, 1.0 + 0.6 * dir.y, 1.0 + 0.4 * dir.z + 0.3 * dir.x * dir.y);
-        // The mean over a texel, of places in it by their area.
+        // Mean over a texel, from places in it weighted by area.
         let mean = |level: &Level, column: u32, row: u32| {
             const PARTS: u8 = 12;
             let part = |k: u8| (f32::from(k) + 0.5) / f32::from(PARTS);
@@ -358,7 +357,7 @@ mod tests {
 
     #[test]
     fn a_sun_lights_by_its_area_and_the_cosine_to_it() {
-        // One texel of 256 × 128 that shines, 1.4° wide: low, near the zenith, and not in the middle of any larger cell.
+        // One bright texel of 256 × 128, 1.4° wide: low, near the zenith, and never in the middle of any larger cell.
         for (column, row) in [(128, 63), (37, 58), (201, 6), (90, 120)] {
             let sky = pyramid(256, 128, |x, y| if (x, y) == (column, row) { [1000.0; 3] } else { [0.0; 3] });
             let sun = sky.levels[0].direction(column as f32 + 0.5, row as f32 + 0.5);

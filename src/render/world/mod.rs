@@ -1,7 +1,7 @@
-//! The scene as the structures see it: every instance's shapes in one centred `f32` frame, but for objects that are stored once
-//! that stand in several places; and the way back from a prim to what it came from.
+//! The scene as acceleration structures see it: all shapes in one centred `f32` frame, except for instanced objects, which are
+//! stored once and placed several times; and the mapping from a prim back to its source.
 //!
-//! Prims have the numbers of the flattened scene, whether or not anything is instanced.
+//! Prim ids are those of the flattened scene, whether or not anything is instanced.
 
 mod placing;
 mod rounding;
@@ -28,32 +28,32 @@ use std::ops::Range;
 /// A [`Scene`] placed for tracing. World position = `center` + position in [`Shapes`].
 #[derive(Clone, Debug)]
 pub struct World {
-    /// What was subtracted from every world position, in `f64`, before rounding.
+    /// Subtracted from every world position, in `f64`, before rounding.
     pub center: DVec3,
-    /// Box of everything but planes, world space; `lo > hi` when there is nothing.
+    /// Box of all shapes but planes, in world space; `lo > hi` when there are none.
     pub bounds: (DVec3, DVec3),
-    /// Every shape that is not instanced, centred; all of them where nothing is, as [`World::new`] does. A structure over
-    /// everything is [`Self::structure`].
+    /// Shapes that are not instanced, centred; all shapes where nothing is instanced, as with [`World::new`]. For a structure
+    /// over everything, see [`Self::structure`].
     pub shapes: Shapes,
-    /// What is stored once and stands in several places.
+    /// Objects that are stored once and placed several times.
     pub instanced: InstancedObjects,
     /// First prim of each instance's triangles, and one past the last.
     first_triangle: Vec<u32>,
     /// First polygon (counted from 0) of each instance, and one past the last.
     first_polygon: Vec<u32>,
     placements: Vec<Placement>,
-    /// Whether no prim lets light pass, whether or not each of them is asked.
+    /// Whether all prims are opaque, even where each is tested for transparency.
     opaque: bool,
 }
 
-/// How an instance turns directions.
+/// How an instance transforms directions.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placement {
     /// Takes tangents to world space; lengths change.
     pub world_from_object: DMat3,
     /// Takes normals to world space; lengths change.
     pub normal_from_object: DMat3,
-    /// Whether the instance is mirrored: its faces keep the corner order of the file, so their winding is turned round.
+    /// Whether the instance is mirrored: its faces keep the corner order of the file, so their winding is reversed.
     pub mirrored: bool,
 }
 
@@ -63,7 +63,7 @@ impl Placement {
     }
 }
 
-/// What a prim came from; indices into the arrays of [`Scene`].
+/// Source of a prim; indices into the arrays of [`Scene`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PrimSource {
     /// A triangle of an instance's mesh.
@@ -93,39 +93,39 @@ impl World {
     ///
     /// # Panics
     ///
-    /// Where [`Scene::check`] finds a fault, which no scene has that was loaded.
+    /// Where [`Scene::check`] finds a fault; loaded scenes have none.
     pub fn new(scene: &Scene) -> Self {
         Self::placing(scene, Instancing::Flatten)
     }
 
-    /// Bytes that [`World::new`] and a structure over it take at least for the triangles of all instances, each stored by
-    /// itself, however few of them the scene stores.
+    /// Lower bound of the bytes that [`World::new`] and a structure over it take for the triangles of all instances, each stored
+    /// by itself, however few of them the scene stores.
     pub fn flattened_bytes(scene: &Scene) -> u64 {
         placing::placed_bytes(scene, scene.instances.iter())
     }
 
-    /// Places every shape, and meshes with several instances as `how` says: rays hit the same prims at the same distances.
+    /// Places every shape, and meshes with several instances according to `how`: rays hit the same prims at the same distances.
     pub fn placing(scene: &Scene, how: Instancing) -> Self {
         Placing::new(scene, how).world()
     }
 
-    /// A structure over everything, and the reason where there was a choice. Where anything is instanced, kinds that cannot
-    /// hold it give way to `fast-octree`, as [`AnyAccel::kind`] tells: to compare structures, instance nothing
+    /// Builds a structure over everything; returns the reason too where there was a choice. Where anything is instanced, kinds
+    /// that do not support it fall back to `fast-octree`, as [`AnyAccel::kind`] reports: to compare structures, instance nothing
     /// ([`World::new`]).
     ///
     /// # Panics
     ///
-    /// It may, with parameters that [`AccelParams::validate`] refuses, and scenes that [`Scene::check`] does.
+    /// May panic with parameters that [`AccelParams::validate`] rejects, and scenes that [`Scene::check`] rejects.
     pub fn structure(&self, choice: AccelChoice, params: &AccelParams) -> (AnyAccel<'_>, Option<Reason>) {
         self.structure_for(u64::MAX, choice, params)
     }
 
-    /// A structure for pictures that begin with so many eye rays together: where these are few, finding out what suits them takes
-    /// longer than it may save, and [`AccelChoice::Auto`] is `fast-octree`.
+    /// Builds a structure for pictures that start with a wave of `eye_rays`: where these are few, finding the best structure
+    /// takes longer than it may save, and [`AccelChoice::Auto`] is `fast-octree`.
     ///
     /// # Panics
     ///
-    /// It may, with parameters that [`AccelParams::validate`] refuses, and scenes that [`Scene::check`] does.
+    /// May panic with parameters that [`AccelParams::validate`] rejects, and scenes that [`Scene::check`] rejects.
     pub fn structure_for(
         &self,
         eye_rays: u64,
@@ -135,12 +135,12 @@ impl World {
         auto::build_with(eye_rays, choice, (&self.shapes, &self.instanced), params)
     }
 
-    /// Which structure [`AccelChoice::Auto`] is, and why.
+    /// Reason for the structure that [`AccelChoice::Auto`] picks.
     pub fn judged(&self) -> Reason {
         auto::reason(&self.shapes, &self.instanced, u64::MAX)
     }
 
-    /// Number of prims of all kinds, those of an object once for each place where it stands.
+    /// Number of prims of all kinds, those of an object once for each placement.
     pub fn len(&self) -> usize {
         self.shapes.len() + self.instanced.shown() as usize
     }
@@ -150,17 +150,17 @@ impl World {
         self.len() == 0
     }
 
-    /// Number of triangles, likewise: the lowest prims.
+    /// Number of triangles, counted the same way; they have the lowest prim ids.
     pub fn triangles(&self) -> u32 {
         index(self.shapes.triangles.len()) + self.instanced.shown()
     }
 
-    /// Bytes of the shapes as they are stored.
+    /// Bytes of the shapes as stored.
     pub fn bytes(&self) -> usize {
         instancing::bytes(&self.shapes, &self.instanced)
     }
 
-    /// What prim `prim` is, in the centred frame.
+    /// Geometry of prim `prim`, in the centred frame.
     #[inline]
     pub fn prim(&self, prim: u32) -> Prim<'_> {
         self.instanced.prim(&self.shapes, prim)
@@ -171,12 +171,12 @@ impl World {
         !matches!(self.prim(prim), Prim::Sphere(_) | Prim::Cone(_))
     }
 
-    /// Number of objects with bounded prims: those of faces, each where it stands, then each sphere and cone.
+    /// Number of objects with bounded prims: face objects, one for each placement, then each sphere and cone.
     pub fn objects(&self) -> usize {
         self.shapes.objects().len() + self.instanced.placed().len()
     }
 
-    /// The corners of triangle `prim`, in the centred frame.
+    /// Corners of triangle `prim`, in the centred frame.
     #[inline]
     pub fn triangle(&self, prim: u32) -> Triangle {
         match self.instanced.find(prim) {
@@ -190,26 +190,26 @@ impl World {
         self.shapes.polygons[(prim - self.triangles()) as usize]
     }
 
-    /// A ray from a place in the world on without end; `dir` keeps its length, in which t counts.
+    /// Endless ray from a world position; `dir` keeps its length, which is the unit of t.
     pub fn ray(&self, origin: DVec3, dir: DVec3) -> Ray {
         Ray::new((origin - self.center).as_vec3(), dir.as_vec3())
     }
 
-    /// Where in the world a place of the centred frame is, such as [`Refined::position`].
+    /// World position of a point in the centred frame, such as [`Refined::position`].
     pub fn to_world(&self, place: Vec3) -> DVec3 {
         place.as_dvec3() + self.center
     }
 
-    /// Position, error bound, normal and weights of a hit that a query found on `ray`, in the centred frame.
+    /// Position, error bound, normal and barycentric weights of a hit on `ray`, in the centred frame.
     ///
     /// # Panics
     ///
-    /// For a miss: [`Hit::is_some`] tells.
+    /// For a miss: check [`Hit::is_some`].
     pub fn refine(&self, ray: &Ray, hit: &Hit) -> Refined {
         self.prim(hit.prim).refine(ray, hit)
     }
 
-    /// This world with no prim that is opaque: each is asked what light it lets through (see [`no_prune`](super::no_prune)).
+    /// This world with no prim marked opaque: each is tested for transparency (see [`no_prune`](super::no_prune)).
     #[must_use]
     pub fn without_pruning(mut self) -> Self {
         self.shapes.opaque = BitSet::filled(self.shapes.len(), false);
@@ -217,17 +217,17 @@ impl World {
         self
     }
 
-    /// The prims of an instance's triangles.
+    /// Prims of an instance's triangles.
     pub(crate) fn triangles_of(&self, instance: u32) -> Range<u32> {
         self.first_triangle[instance as usize]..self.first_triangle[instance as usize + 1]
     }
 
-    /// Whether prim `prim` is stored by itself, and not once for all places where it stands.
+    /// Whether prim `prim` is stored by itself, and not as part of an instanced object.
     pub(crate) fn is_stored(&self, prim: u32) -> bool {
         matches!(self.instanced.find(prim), PrimLocation::Stored(_))
     }
 
-    /// What prim `prim` came from; of a number below [`Self::len`], others mean nothing.
+    /// Source of prim `prim`, which must be below [`Self::len`]; the result is meaningless for others.
     pub fn source(&self, prim: u32) -> PrimSource {
         let (triangles, polygons) = (self.triangles(), index(self.shapes.polygons.len()));
         let (spheres, cones) = (index(self.shapes.spheres.len()), index(self.shapes.cones.len()));
@@ -247,11 +247,11 @@ impl World {
         }
     }
 
-    /// The material of prim `prim`, an index into `scene.materials`.
+    /// Material of prim `prim`, an index into `scene.materials`.
     ///
     /// # Panics
     ///
-    /// Where the scene has no such prim: that of [`Hit::MISS`] is none.
+    /// Where the scene has no such prim: the one of [`Hit::MISS`] is none.
     ///
     /// [`Hit::MISS`]: crate::accel::Hit::MISS
     pub fn material(&self, scene: &Scene, prim: u32) -> u32 {
@@ -265,18 +265,18 @@ impl World {
         }
     }
 
-    /// How instance `instance` turns directions.
+    /// How instance `instance` transforms directions.
     pub(crate) fn placement(&self, instance: u32) -> &Placement {
         &self.placements[instance as usize]
     }
 
-    /// Of what is not instanced.
+    /// Opacity bits of the shapes that are not instanced.
     fn opaque_bits(&self, scene: &Scene, solids: &[Solid]) -> BitSet {
         let mut bits = BitSet::filled(self.shapes.len(), true);
         if scene.materials.iter().all(Material::is_opaque) {
             return bits;
         }
-        // An instance has one material, so that no prim of it needs to be looked up.
+        // An instance has one material, so its prims need no lookup each.
         let first_polygon = index(self.shapes.triangles.len());
         for (i, instance) in scene.instances.iter().enumerate() {
             let solid = match &solids[instance.mesh as usize] {
@@ -300,13 +300,14 @@ impl World {
         bits
     }
 
-    /// Whether everything stops light.
+    /// Whether all prims are opaque.
     pub(crate) fn is_opaque(&self) -> bool {
         self.opaque
     }
 }
 
-/// Numbers of prims are in range ([`Scene::MOST_PRIMS`]); those of vertices, of which there are up to three for each, may not be.
+/// Converts an index to `u32`. Prim ids are in range ([`Scene::MOST_PRIMS`]); vertex indices, up to three for each prim, may not
+/// be.
 fn index(i: usize) -> u32 {
     u32::try_from(i).unwrap_or_else(|_| panic!("the scene is too large: {i} vertices and more, stored by themselves"))
 }

@@ -1,4 +1,4 @@
-//! Which objects are instanced and where they stand, and then the whole world.
+//! Chooses which objects are instanced and where they stand, then builds the world.
 
 use super::solid::{Solid, solids};
 use super::{Placement, World, index};
@@ -11,22 +11,22 @@ use crate::scene::corners::{Hull, take_in};
 use crate::scene::{Instance, Mesh, Scene};
 use rayon::prelude::*;
 
-/// Bytes that a triangle takes at least when it is placed by itself, with the fast structure that takes least while it is
-/// built; measured on four million.
+/// Lower bound of the bytes for a triangle stored by itself, with the fast structure that takes least memory during its build;
+/// measured on four million.
 const PLACED: u64 = 120;
 
-/// A scene of which is known which objects are instanced and where they stand, before anything is stored.
+/// A scene whose instancing is planned, before anything is stored.
 pub struct Placing<'a> {
     scene: &'a Scene,
     bounds: (DVec3, DVec3),
     center: DVec3,
-    /// What of each mesh stops light.
+    /// Opaque triangles of each mesh.
     solids: Vec<Solid>,
     instancing: InstancePlan,
 }
 
 impl<'a> Placing<'a> {
-    /// Finds the centre, chooses which objects are instanced, and where they stand.
+    /// Finds the centre, and plans which objects are instanced and where they stand.
     pub fn new(scene: &'a Scene, how: Instancing) -> Self {
         let bounds = bounds(scene);
         let center = center_of_most(bounds.0, bounds.1, sample(scene).into_iter());
@@ -35,13 +35,13 @@ impl<'a> Placing<'a> {
         Self { scene, bounds, center, solids, instancing }
     }
 
-    /// Bytes that its world and a structure over it take at least for triangles of instances that are stored by themselves.
+    /// Lower bound of the bytes of the world and a structure over it for the triangles of instances stored by themselves.
     pub fn bytes(&self) -> u64 {
         let each = self.scene.instances.iter().zip(&self.instancing.places).filter(|(_, place)| place.is_none());
         placed_bytes(self.scene, each.map(|(instance, _)| instance))
     }
 
-    /// Stores everything where it stands, rounded once.
+    /// Stores all shapes at their places, rounded once.
     pub fn world(self) -> World {
         let Self { scene, bounds, center, solids, instancing: InstancePlan { mut instanced, places } } = self;
         let mut shapes = Shapes::default();
@@ -92,7 +92,7 @@ impl<'a> Placing<'a> {
     }
 }
 
-/// Stores spheres, cones and planes around the centre.
+/// Stores spheres, cones and planes relative to the centre.
 #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
 fn put_solids(scene: &Scene, center: DVec3, shapes: &mut Shapes) {
     let sphere =
@@ -109,21 +109,21 @@ fn put_solids(scene: &Scene, center: DVec3, shapes: &mut Shapes) {
     shapes.planes = scene.planes.iter().map(plane).collect();
 }
 
-/// Bytes of the triangles of these instances, each stored by itself, with a structure over them, at least.
+/// Lower bound of the bytes of these instances' triangles, each stored by itself, with a structure over them.
 pub(super) fn placed_bytes<'a>(scene: &Scene, instances: impl Iterator<Item = &'a Instance>) -> u64 {
     let of = |mesh: u32| scene.meshes.get(mesh as usize).map_or(0, |mesh| mesh.triangles.len() as u64);
     instances.map(|instance| of(instance.mesh)).fold(0, u64::saturating_add).saturating_mul(PLACED)
 }
 
-/// `world_from_object` followed by the move to the centred frame, composed in `f64`.
+/// `world_from_object` followed by the translation to the centred frame, composed in `f64`.
 pub(super) fn centered(world_from_object: &DAffine3, center: DVec3) -> DAffine3 {
     DAffine3 { matrix3: world_from_object.matrix3, translation: world_from_object.translation - center }
 }
 
-/// Vertices that are worth a thread's while.
+/// Vertices that are worth a thread of their own.
 pub(super) const PARALLEL_RUN: usize = 1 << 14;
 
-/// Some of the corners of all faces and places of spheres and cones, spread evenly.
+/// Evenly spread samples of the corners of all faces and the positions of spheres and cones.
 fn sample(scene: &Scene) -> Vec<DVec3> {
     let corners = |i: &Instance| {
         let mesh = &scene.meshes[i.mesh as usize];
@@ -152,7 +152,7 @@ fn sample(scene: &Scene) -> Vec<DVec3> {
     points
 }
 
-/// Box of all instances' vertices that a face uses, and of the spheres and cones.
+/// Box of all vertices that a face of an instance uses, and of the spheres and cones.
 fn bounds(scene: &Scene) -> (DVec3, DVec3) {
     let mut faces = Hull::EMPTY;
     take_in(scene, &mut faces);

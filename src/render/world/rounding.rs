@@ -1,4 +1,4 @@
-//! What rounding to `f32` does to a scene when it is placed.
+//! Error of rounding a scene to `f32` when it is placed.
 
 use super::World;
 use super::placing::{PARALLEL_RUN, centered};
@@ -8,7 +8,7 @@ use crate::math::{DVec3, Vec3};
 use crate::scene::Scene;
 use rayon::prelude::*;
 
-/// What rounding has moved.
+/// Object that rounding has moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moved {
     /// Index into [`Scene::instances`].
@@ -20,9 +20,9 @@ pub enum Moved {
 }
 
 impl World {
-    /// How far rounding to `f32` has moved corners of faces, surfaces of spheres and ends of cones at most from where `scene`
-    /// has them, of which this is the world; world units. Corners of objects are not looked at one by one: of them, the most
-    /// that can be.
+    /// Largest distance that rounding to `f32` has moved corners of faces, surfaces of spheres and ends of cones from their
+    /// places in `scene`, whose world this is; world units. For instanced objects, which are not compared corner by corner, an
+    /// upper bound.
     pub fn rounding(&self, scene: &Scene) -> f64 {
         let mut from = 0;
         let stored = scene.instances.iter().enumerate().filter(|(i, _)| self.stored(*i)).map(|(_, instance)| {
@@ -40,7 +40,7 @@ impl World {
         instanced.chain(solids).fold(stored, f64::max)
     }
 
-    /// How far rounding has moved each sphere and cone, and how large it is.
+    /// Distance that rounding has moved each sphere and cone, and its size.
     fn solids_moved(&self, scene: &Scene) -> impl Iterator<Item = (Moved, f64, f64)> {
         let moved = |at: DVec3, there: Vec3| (at - self.center).distance(there.as_dvec3());
         let resized = |radius: f64, there: f32| (radius - f64::from(there)).abs();
@@ -57,8 +57,8 @@ impl World {
         spheres.chain(cones).filter(|(_, off, _)| off.is_finite())
     }
 
-    /// What rounding has moved by the largest part of its size, with that part, if it is more than `most`: it stands so far
-    /// from the middle of the scene that it is not what the file says.
+    /// Object that rounding has moved by the largest fraction of its size, with that fraction, if it exceeds `most`: the object
+    /// is so far from the middle of the scene that its shape is distorted.
     pub fn coarsest(&self, scene: &Scene, most: f64) -> Option<(Moved, f64)> {
         let worse = |a: &(Moved, f64), b: &(Moved, f64)| a.1.total_cmp(&b.1);
         let solids = self.solids_moved(scene).map(|(which, off, size)| (which, off / size));
@@ -66,22 +66,22 @@ impl World {
         solids.filter(|(_, part)| *part > most && part.is_finite()).chain(instance).max_by(worse)
     }
 
-    /// The instance that rounding moves by the largest part of its size, if that is more than `most`.
+    /// Instance that rounding moves by the largest fraction of its size, if that exceeds `most`.
     fn coarsest_instance(&self, scene: &Scene, most: f64) -> Option<(usize, f64)> {
         let mut from = 0;
         let mut worst: Option<(usize, f64)> = None;
-        // One that stands alone is in the middle.
+        // A single instance is in the middle of the scene.
         if scene.instances.len() < 2 {
             return None;
         }
-        // Instanced objects have been looked at.
+        // Instanced objects were checked when they were placed.
         for (i, instance) in scene.instances.iter().enumerate().filter(|(i, _)| self.stored(*i)) {
             let len = scene.meshes[instance.mesh as usize].positions.len();
             let there = Aabb::around(self.shapes.vertices[from..from + len].iter().copied());
             from += len;
             let size = f64::from((there.hi - there.lo).max_element());
             let part = half_steps(&there) / size;
-            // Points and what has collapsed have no size to compare with.
+            // Points and collapsed meshes have no size to compare with.
             let is_worse = part > worst.map_or(most, |(_, part)| part);
             if is_worse && part.is_finite() {
                 worst = Some((i, part));
@@ -97,7 +97,7 @@ impl World {
     }
 }
 
-/// How far rounding moves points of a box at most.
+/// Upper bound of the distance that rounding moves points of a box.
 fn half_steps(bounds: &Aabb) -> f64 {
     let most = bounds.lo.abs().max(bounds.hi.abs());
     let step = most.map(|x| x.next_up() - x).as_dvec3();

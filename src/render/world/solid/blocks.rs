@@ -1,4 +1,4 @@
-//! Which parts of a bitmap hold nothing but numbers of a range: sums over blocks of texels, asked in any rectangle.
+//! Parts of a bitmap whose values all lie in a range: summed-area tables over blocks of texels, queried for any rectangle.
 
 use super::ALPHA;
 use crate::math::Vec2;
@@ -8,19 +8,18 @@ use rayon::prelude::*;
 /// Columns and rows of texels in a block.
 const BLOCK: usize = 8;
 
-/// The least and the greatest number that each block of texels of a bitmap holds in a channel: read once, however many
-/// ranges are asked for.
+/// Minimum and maximum of a channel in each block of texels of a bitmap: read once, however many ranges are queried.
 pub(super) struct Extremes {
     /// Columns and rows of the bitmap.
     size: [usize; 2],
-    /// The number of what is there as a whole.
+    /// Value that stands for 1.
     largest: u16,
-    /// Row by row; empty for a bitmap without the channel, all of which is the largest.
+    /// Minimum and maximum of each block, row by row; empty for a bitmap without the channel, which then is `largest` everywhere.
     blocks: Vec<[u16; 2]>,
 }
 
 impl Extremes {
-    /// Those of a bitmap; `None` if it is not there.
+    /// Reads a bitmap; `None` if it has no texels.
     pub(super) fn of(bitmap: &Bitmap, channel: usize) -> Option<Self> {
         let size = [bitmap.width as usize, bitmap.height as usize];
         let texels = size[0].checked_mul(size[1]).filter(|&texels| texels > 0)?;
@@ -34,7 +33,7 @@ impl Extremes {
         Some(Self { size, largest, blocks })
     }
 
-    /// The blocks whose numbers are the least, or more, and the most, or less, 0 … 1.
+    /// Blocks whose values all lie in this range, 0 … 1, ends included.
     pub(super) fn blocks(&self, range: [f32; 2]) -> Blocks {
         let [least, most] = range.map(|part| code(part, self.largest));
         let is_open = |&[lo, hi]: &[u16; 2]| lo < least || hi > most;
@@ -43,21 +42,21 @@ impl Extremes {
     }
 }
 
-/// Which blocks of texels of a bitmap are solid.
+/// Solid blocks of texels of a bitmap.
 pub(super) struct Blocks {
     /// Columns and rows of the bitmap.
     size: [usize; 2],
-    /// How many are not, above and to the left of each corner of a block, row by row; empty where all are.
+    /// Number of open blocks above and to the left of each corner of a block, row by row; empty where none is open.
     sums: Vec<u32>,
 }
 
 impl Blocks {
-    /// Whether all are solid.
+    /// Whether all blocks are solid.
     pub(super) fn are_solid(&self) -> bool {
         self.sums.is_empty()
     }
 
-    /// Whether all are from which anything is read between these coordinates.
+    /// Whether all blocks are solid that lookups between these coordinates read.
     pub(super) fn are_solid_between(&self, lo: Vec2, hi: Vec2, wrap: [Wrap; 2]) -> bool {
         let columns = spans([lo.x, hi.x], self.size[0], wrap[0]);
         let rows = spans([lo.y, hi.y], self.size[1], wrap[1]);
@@ -73,13 +72,13 @@ impl Blocks {
     }
 }
 
-/// The least stored number that is no less than such a part of the largest.
+/// Smallest stored value that is no less than `part` of the largest.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 … 65535")]
 pub(in crate::render) fn code(part: f32, largest: u16) -> u16 {
     libm::ceil(f64::from(part) * f64::from(largest)) as u16
 }
 
-/// The least and the greatest number of a channel in each block of texels, row by row.
+/// Minimum and maximum of a channel in each block of texels, row by row.
 fn extremes<T: Copy + Ord + Into<u16> + Sync, const N: usize>(
     [width, height]: [usize; 2],
     texels: &[[T; N]],
@@ -102,7 +101,7 @@ fn extremes<T: Copy + Ord + Into<u16> + Sync, const N: usize>(
     blocks
 }
 
-/// How many of the blocks above and to the left of each corner are open.
+/// Number of open blocks above and to the left of each corner of a block.
 fn summed([width, height]: [usize; 2], blocks: &[[u16; 2]], is_open: impl Fn(&[u16; 2]) -> bool) -> Vec<u32> {
     let (columns, rows) = (width.div_ceil(BLOCK), height.div_ceil(BLOCK));
     let pitch = columns + 1;
@@ -120,14 +119,14 @@ fn summed([width, height]: [usize; 2], blocks: &[[u16; 2]], is_open: impl Fn(&[u
 /// Coordinates beyond this are rounded by more than a texel of large maps.
 pub(super) const FARTHEST: f32 = 64.0;
 
-/// The first and last texels along an axis of all that is read between two coordinates: one run of them or two.
+/// First and last texel along an axis of all that lookups between two coordinates read: one run of texels, or two.
 #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "places of some texels")]
 fn spans([lo, hi]: [f32; 2], len: usize, wrap: Wrap) -> [Option<[usize; 2]>; 2] {
     let all = [Some([0, len - 1]), None];
     if !(lo >= -FARTHEST && hi <= FARTHEST) {
         return all;
     }
-    // Two texels are mixed; one more on each side is for rounding.
+    // Bilinear lookups read two texels; one more on each side allows for rounding.
     let place = |c: f32| libm::floor(f64::from(c) * len as f64 - 0.5) as i64;
     let (first, last, count) = (place(lo) - 1, place(hi) + 2, len as i64);
     let index = |i: i64| usize::try_from(i).unwrap_or(0).min(len - 1);
@@ -176,7 +175,7 @@ mod tests {
                             let (a, b) = (random.below(side), random.below(side));
                             (a.min(b), a.max(b))
                         });
-                        // From the middles of texels to those of others.
+                        // From the middle of one texel to that of another.
                         let middle = |x: usize, y: usize| {
                             Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32)
                         };

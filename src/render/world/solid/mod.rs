@@ -1,8 +1,8 @@
-//! Triangles of see-through materials that are there as a whole all the same: no texel that is read on them lets anything
-//! through, and no colour of their corners does.
+//! Triangles of see-through materials that are opaque all the same: no texel read on them is transparent, and no vertex colour
+//! is.
 //!
-//! Many programs write that a material is blended or cut out where little of it is: one leaf on an atlas, or nothing at all.
-//! What is known to stop light need not be asked at every point.
+//! Many programs mark a whole material as blended or cut out where little of it is: one leaf in an atlas, or nothing at all.
+//! Triangles known to be opaque need no test at every hit.
 
 mod blocks;
 
@@ -16,18 +16,18 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Which faces of a mesh stop light.
+/// Opaque faces of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Solid {
     /// All.
     All,
-    /// The triangles with a bit.
+    /// The triangles whose bit is set.
     Some(BitSet),
     /// None.
     None,
 }
 
-/// Which faces of each mesh of a scene stop light; of textures that are not there nothing is known.
+/// Opaque faces of each mesh of a scene; where textures are missing, none counts as opaque.
 pub(super) fn solids(scene: &Scene) -> Vec<Solid> {
     let mut known = Known { scene, extremes: HashMap::new(), blocks: HashMap::new() };
     let mut layers: Vec<Option<Option<Vec<Layer>>>> = scene.materials.iter().map(|_| None).collect();
@@ -43,25 +43,25 @@ pub(super) fn solids(scene: &Scene) -> Vec<Solid> {
     scene.meshes.iter().map(of).collect()
 }
 
-/// A map whose numbers must be such that nothing is let through.
+/// A map, with its blocks whose values let no light through.
 struct Layer {
     map: TextureRef,
     wrap: [Wrap; 2],
     blocks: Arc<Blocks>,
 }
 
-/// What is known of bitmaps: materials often share them.
+/// Cache of block tables of bitmaps: materials often share them.
 struct Known<'a> {
     scene: &'a Scene,
-    /// By number and channel.
+    /// By bitmap and channel.
     extremes: HashMap<(u32, usize), Option<Extremes>>,
-    /// By number, channel, and the bits of what may be stored.
+    /// By bitmap, channel, and the bits of the range that counts as solid.
     blocks: HashMap<(u32, usize, [u32; 2]), Option<Arc<Blocks>>>,
 }
 
 impl Known<'_> {
-    /// The maps of a material that is solid where all of them are, and the colour of vertices; `None` for what is nowhere, or
-    /// where that is not known.
+    /// Maps of a material whose faces are opaque where all these maps are solid and vertex colours are too; `None` where no face
+    /// is opaque, or where that is unknown.
     fn layers(&mut self, material: &Material) -> Option<Vec<Layer>> {
         let least = least(material)?;
         let mut maps = Vec::new();
@@ -69,7 +69,7 @@ impl Known<'_> {
             maps.extend([(&material.base_color_map, ALPHA, [least, 1.0]), (&material.opacity_map, RED, [1.0; 2])]);
         }
         if material.reflection.transmits() {
-            // Glass stops light where its map says so.
+            // Glass is opaque where its transmission map is 0.
             let map = &material.metal_rough()?.transmission_map;
             map.as_ref()?;
             maps.push((map, RED, [0.0; 2]));
@@ -94,9 +94,9 @@ impl Known<'_> {
 const RED: usize = 0;
 const ALPHA: usize = 3;
 
-/// The least alpha of a map of base colours, 0 … 1, with which a material is there as a whole; `None` if none suffices.
+/// Smallest alpha of the base colour map, 0 … 1, with which a material is opaque; `None` if none suffices.
 pub(in crate::render) fn least(material: &Material) -> Option<f32> {
-    /// More than the mean of four texels is rounded, in parts of them.
+    /// Bound of the rounding of the mean of four texels, relative.
     const ROUNDING: f32 = 1e-5;
     let opacity = material.opacity;
     let least = match material.alpha_mode {
@@ -105,7 +105,7 @@ pub(in crate::render) fn least(material: &Material) -> Option<f32> {
         AlphaMode::Blend if opacity >= 1.0 => 1.0,
         AlphaMode::Mask { .. } | AlphaMode::Blend => return None,
     };
-    // Of an opacity of 0, which may be enough, any part is.
+    // An opacity of 0 that passes the cutoff passes it with any alpha.
     Some(if least.is_nan() { 0.0 } else { least })
 }
 
@@ -131,17 +131,17 @@ fn solid(mesh: &Mesh, layers: &[Layer]) -> Solid {
     Solid::Some(bits)
 }
 
-/// Triangles that are worth a thread's while.
+/// Triangles that are worth a thread of their own.
 const TRIANGLES: usize = 1 << 12;
 
 impl Layer {
-    /// Whether all that is read on a triangle is solid.
+    /// Whether all texels read on a triangle are solid.
     fn is_solid_on(&self, mesh: &Mesh, corners: [u32; 3]) -> bool {
         if self.blocks.are_solid() {
             return true;
         }
         let Some((_, uvs)) = coordinates_at(mesh, corners, [0.0; 3], &self.map) else { return false };
-        // What is far away is rounded by more than a texel, also where an offset brings it back.
+        // Distant coordinates are rounded by more than a texel, even where an offset brings them back.
         if !uvs.iter().all(|uv| uv.abs().max_element() <= FARTHEST) {
             return false;
         }
@@ -158,7 +158,7 @@ mod tests {
     use crate::render::texture::TextureStore;
     use crate::scene::{Bitmap, Filter, MetalRough, Phong, Pixels, Reflection, Sampler, Texture, UvTransform};
 
-    /// Mostly solid, with some holes: all of one or of several texels.
+    /// Mostly solid, with some holes of one or of several texels.
     fn holed(random: &mut Random, [width, height]: [usize; 2]) -> Bitmap {
         let mut texels = vec![[90, 120, 40, 255]; width * height];
         for _ in 0..3 {
@@ -173,7 +173,7 @@ mod tests {
         Bitmap { name: String::new(), width, height, pixels: Pixels::Rgba8(texels.into()) }
     }
 
-    /// A soup of triangles with coordinates as large as `size`.
+    /// Random triangles whose coordinates span up to `size`.
     fn soup(random: &mut Random, count: u32, size: f32) -> Mesh {
         let corners = (0..count).flat_map(|_| {
             let (at, reach) = (random.cube() * 3.0, size * random.unit() * random.unit());
@@ -184,7 +184,7 @@ mod tests {
         Mesh { uvs: vec![positions.iter().map(|p| p.truncate()).collect()], positions, triangles, ..Mesh::default() }
     }
 
-    /// What is stored as a scene with one mesh and one material with a map.
+    /// Scene with one mesh and one material with a map.
     fn scene(bitmap: Bitmap, sampler: Sampler, mesh: Mesh, material: Material) -> Scene {
         Scene {
             bitmaps: vec![bitmap],
@@ -277,7 +277,7 @@ mod tests {
         assert_eq!(of(rgb(), Material { opacity: 0.99, ..blend() }, None), Solid::None);
         let glass = Reflection::Phong(Phong { transmission: Vec3::X, ..Phong::default() });
         assert_eq!(of(rgb(), Material { reflection: glass, ..blend() }, None), Solid::None);
-        // The red of a map of opacity counts, not its alpha.
+        // An opacity map counts by its red, not by its alpha.
         let map_d = |red| {
             let opacity_map = blend().base_color_map;
             let pixels = Pixels::Rgba8(vec![[red, 0, 0, 0]; 8].into());
