@@ -1,4 +1,4 @@
-//! A cut-out face, and where rays meet it: in one line of memory.
+//! A cut-out face, and lookups where rays hit it: in one cache line.
 
 use crate::accel::Ray;
 use crate::math::bounds::FACE_COORDINATE;
@@ -7,40 +7,40 @@ use crate::math::{DVec2, DVec3, Vec2, Vec3};
 use crate::render::texture::Survey;
 use bytemuck::{Pod, Zeroable};
 
-/// Where a ray goes so much farther along a face than across its cone nothing is known: how wide it is there depends on
-/// roundings.
+/// Where a ray travels more than this many times as far along a face as across its cone, nothing is known: the width of its cone
+/// there depends on rounding.
 const GRAZING: f32 = 50.0;
 
-/// A triangle is left out of which two edges' lengths, multiplied, are more than this many times twice its area: so normal and
-/// gradients, computed in `f64`, are right to far more than the digits that are kept.
+/// A triangle is skipped if the product of two edge lengths is more than this many times twice its area: so normal and gradients,
+/// computed in `f64`, are exact to far more than the digits that are stored.
 const SLENDER: f64 = 500.0;
 
-/// Error of coordinates, texels, beside that of [`FACE_COORDINATE`]: what a lookup rounds of places between texels.
+/// Error of coordinates, in texels, beside that of [`FACE_COORDINATE`]: rounding of positions between texels in a lookup.
 const BLUR: f32 = 0.05;
 
-/// It is seen from its front alone.
+/// Flag: the face is visible from its front only.
 const ONE_SIDED: u32 = 1;
 
-/// Its map is read as sharply as it is stored, whatever a cone covers.
+/// Flag: the map is read at full resolution, whatever the cone.
 const SHARP: u32 = 2;
 
-/// A face and how coordinates run along it.
+/// Plane of a face and the map's coordinates on it.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Face {
-    /// Outward, of unit length, and where its plane is.
+    /// Outward unit normal, and the plane's offset.
     normal: Vec3,
     place: f32,
-    /// How both coordinates grow, texels by world units, and what they are at the origin.
+    /// Gradients of both coordinates, texels per world unit, and their values at the origin.
     along: [Vec3; 2],
     at: Vec2,
-    /// How fast they grow at most.
+    /// Upper bound of the gradient.
     growth: f32,
-    /// The number of its map, from 1 on; 0: nothing is known.
+    /// Number of the map, from 1 on; 0: nothing is known.
     pub(super) map: u32,
-    /// Of [`ONE_SIDED`] and [`SHARP`].
+    /// Combination of [`ONE_SIDED`] and [`SHARP`].
     flags: u32,
-    /// Error of coordinates, texels, by the sizes of the numbers that they are made from.
+    /// Error of the coordinates, in texels, from the sizes of the numbers that they are computed from.
     error: f32,
 }
 
@@ -50,8 +50,8 @@ fn narrow(x: f64) -> f32 {
 }
 
 impl Face {
-    /// That of a triangle with these coordinates, texels, at its corners, to which an offset is added; `None` where they tell
-    /// nothing of use.
+    /// Face of a triangle with these coordinates, in texels, at its corners, to which an offset is added; `None` where they are
+    /// too inexact to be of use.
     pub(super) fn new(corners: [Vec3; 3], uv: [Vec2; 3], offset: Vec2, outward: f32) -> Option<Self> {
         let [a, b, c] = corners.map(|corner| corner.as_dvec3());
         let (e1, e2) = (b - a, c - a);
@@ -65,7 +65,7 @@ impl Face {
         let edges = [of_second - first, of_third - first];
         let along = [0, 1].map(|k: usize| second * edges[0][k] + third * edges[1][k]);
         let at = first + offset.as_dvec2() - DVec2::new(along[0].dot(a), along[1].dot(a));
-        // The longer axis of the ellipse that a unit circle becomes.
+        // Major axis of the ellipse that a unit circle maps to.
         let (u, v, both) = (along[0].length_squared(), along[1].length_squared(), along[0].dot(along[1]));
         let growth = (0.5 * (u + v) + (0.25 * (u - v) * (u - v) + both * both).sqrt()).sqrt();
         let largest = |v: [DVec3; 3]| v.into_iter().map(|v| v.abs().max_element()).fold(0.0, f64::max);
@@ -91,8 +91,8 @@ impl Face {
         Self { map, flags: (u32::from(one_sided) * ONE_SIDED) | (u32::from(sharp) * SHARP), ..self }
     }
 
-    /// What is known of where some rays meet the plane; of maps as sharp as they are where cones have no width, or
-    /// that are read so.
+    /// What is certain where some rays hit the plane; maps are read at full resolution where cones have no width, or for
+    /// [`SHARP`] faces.
     #[inline(always)]
     pub(super) fn sure<const N: usize>(&self, map: &Survey, rays: &Rays<N>) -> Sure {
         let backs_count = rays.looks & (self.flags & ONE_SIDED != 0);
@@ -111,12 +111,12 @@ impl Face {
             let error = BLUR + self.error + (largest * self.growth * longer + largest_at) * FACE_COORDINATE;
             let across = (width + spread * t) * growth;
             let reach = map.reach(across, across * longer) + error;
-            // Backs of one-sided faces are passed, too, but as something that is there.
+            // Backs of one-sided faces are passed, too, but not as gaps of the map.
             let unknown = (longer > GRAZING) | (t <= rays.from[i]) | (backs_count & (slope > 0.0));
             *needed = if unknown { f32::INFINITY } else { reach };
         }
         let room = map.room(&at);
-        // False for what is no number.
+        // NaN compares as false.
         (0..N).fold(Sure { clear: 0, solid: 0 }, |Sure { clear, solid }, i| Sure {
             clear: clear | u32::from(needed[i] <= room[i]) << i,
             solid: solid | u32::from(needed[i] <= -room[i]) << i,
@@ -124,23 +124,23 @@ impl Face {
     }
 }
 
-/// A ray that meets faces.
+/// A ray that hits faces.
 #[derive(Clone, Copy)]
 pub(super) struct Sight<'r> {
     pub(super) ray: &'r Ray,
-    /// Width of its cone at the start, and its growth.
+    /// Width of the cone at the start, and its growth.
     pub(super) cone: [f32; 2],
-    /// Where it may meet what it has crossed, or comes from, once more: up to here nothing is passed, for that matters to what
-    /// comes next.
+    /// Distance up to which the ray may hit again a surface it has crossed or starts from: nothing is skipped up to there, as
+    /// that decides about later hits.
     pub(super) from: f32,
 }
 
-/// Rays of a mask that meet a face where it is known what is there.
+/// Masks of rays that hit a face where its opacity is known.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sure {
-    /// Those that meet nothing.
+    /// Rays that hit a gap.
     pub(super) clear: u32,
-    /// Those that meet what is there as a whole, unless they look: that is shaded in any case.
+    /// Rays that hit a solid part; for rays that look for surfaces this is unused: the hit is shaded in any case.
     pub(super) solid: u32,
 }
 
@@ -148,10 +148,10 @@ pub(super) struct Sure {
 pub(super) struct Rays<const N: usize> {
     origin: [[f32; N]; 3],
     dir: [[f32; N]; 3],
-    /// Widths of their cones at the start, and their growths.
+    /// Widths of the cones at the start, and their growths.
     cone: [[f32; N]; 2],
     from: [f32; N],
-    /// Whether they look, and see fronts alone of what is one-sided.
+    /// Whether the rays look for surfaces, and see one-sided faces from the front only.
     looks: bool,
 }
 
@@ -169,7 +169,7 @@ impl<const N: usize> Rays<N> {
     }
 }
 
-/// Eight rays that meet a face.
+/// Kernel for eight rays that hit a face.
 pub(super) struct Eight<'r>(pub(super) &'r Face, pub(super) &'r Survey, pub(super) Rays<LANES>);
 
 impl Kernel for Eight<'_> {

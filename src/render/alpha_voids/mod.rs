@@ -1,9 +1,9 @@
-//! Gaps of what is cut out or blended, known without shading: rays pass them on their way. And where it is solid: it stops rays
-//! to lights.
+//! Gaps in cut-out or blended surfaces, known without shading: rays pass them during traversal. And solid parts, which stop
+//! shadow rays.
 //!
-//! Most of what rays meet in a tree are the clear parts of its leaves. Where a map is clear as far around as a lookup may read
-//! ([`Survey`]) it need not be read, and the ray need not stop there. What is not that sure is shaded, with the same outcome: a
-//! gap is passed as if it were not there, so that pictures are the same bit by bit. Counted runs stop at all of them.
+//! Most hits in a tree are the clear parts of its leaves. Where a map is clear as far around as a lookup may read ([`Survey`]),
+//! it need not be read, and the ray need not stop. Other hits are shaded, with the same outcome: a gap is passed as if it were
+//! not there, so that pictures are the same bit by bit. Counted runs stop at all of them.
 
 mod face;
 #[cfg(test)]
@@ -25,35 +25,35 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// Rays that meet faces before it is worth finding out where maps are clear: some, and one for so many texels, and for so many
-/// faces, of which a large part will not be met twice.
+/// Number of rays that must hit faces before surveying the maps is worth it: a minimum, plus one for every so many texels and
+/// every so many faces, a large part of which will not be hit twice.
 const ENOUGH: usize = 1 << 12;
 const TEXELS: usize = 1 << 8;
 const FACES: usize = 1 << 3;
 
-/// More faces than these are not kept: each is found anew when it is met.
+/// Maximum number of faces that are kept: beyond it each is computed when it is hit.
 const MOST: usize = 1 << 20;
 
-/// So near, in parts of what places are computed from, a surface may be met once more.
+/// Distance, relative to the numbers that positions are computed from, within which a surface may be hit again.
 const NEAR: f32 = 1e-3;
 
-/// What of a scene has gaps, and where.
+/// Surfaces of a scene that have gaps.
 #[derive(Debug)]
 pub(crate) struct AlphaVoids<'a> {
     scene: &'a Scene,
     world: &'a World,
     textures: &'a TextureStore<'a>,
-    /// By mesh.
+    /// Masked meshes, by mesh index.
     masked_meshes: Vec<Option<MaskedMesh<'a>>>,
-    /// The prims that are faces of masked meshes and stored, in order, and how many come before each of these runs.
+    /// Runs of stored prims that are faces of masked meshes, in order, each with the number of such prims before it.
     runs: Vec<(Range<u32>, usize)>,
     count: usize,
     maps: Late<Maps>,
-    /// In the order of the runs. It is worth finding all of them once as many rays have met any.
+    /// In the order of the runs. Computing all is worth it once as many rays have hit any.
     faces: Late<Vec<Face>>,
 }
 
-/// What is computed once it was asked for often enough; until then, and while a thread computes it, others do without.
+/// A value computed after enough requests; until then, and while a thread computes it, callers do without.
 #[derive(Debug)]
 struct Late<T> {
     enough: usize,
@@ -67,12 +67,12 @@ impl<T> Late<T> {
         Self { enough, asked: AtomicUsize::new(0), taken: AtomicBool::new(false), found: OnceLock::new() }
     }
 
-    /// It is never computed.
+    /// A value that is never computed.
     fn never() -> Self {
         Self { taken: AtomicBool::new(true), ..Self::after(usize::MAX) }
     }
 
-    /// What so many rays more ask for.
+    /// Returns the value, if it is computed or these `rays` complete the number of requests for it.
     fn get(&self, rays: usize, find: impl FnOnce() -> T) -> Option<&T> {
         if let Some(found) = self.found.get() {
             return Some(found);
@@ -87,15 +87,15 @@ impl<T> Late<T> {
     }
 }
 
-/// The map that decides where a material is.
+/// The map that decides about a material's opacity.
 #[derive(Clone, Copy, Debug)]
 struct Cut<'a> {
     map: &'a TextureRef,
     channel: usize,
-    /// What is stored there where the material is not, and where all of it is.
+    /// Highest code of a gap, and lowest code of a solid part.
     codes: Codes,
     one_sided: bool,
-    /// Whether it is read as sharply as it is.
+    /// Whether the map is always read at full resolution.
     sharp: bool,
 }
 
@@ -106,15 +106,15 @@ struct MaskedMesh<'a> {
     mesh: &'a Mesh,
     uvs: &'a [Vec2],
     turn: Turn,
-    /// Texels along both axes of the map.
+    /// Size of the map, in texels.
     texels: Vec2,
 }
 
-/// What is known of maps.
+/// Surveys of the maps.
 #[derive(Debug)]
 struct Maps {
     surveys: Vec<Arc<Option<Survey>>>,
-    /// The number of that of each mesh among them, if it has one.
+    /// Index of the survey of each mesh, if it has one.
     of_meshes: Vec<Option<u32>>,
 }
 
@@ -158,19 +158,19 @@ impl<'a> AlphaVoids<'a> {
         })
     }
 
-    /// What rays with these cones around them find.
+    /// Filter of hits for rays with these cones.
     pub(super) fn filter<'r>(&'r self, rays: &'r [Ray], cones: Cones<'r>) -> AlphaFilter<'r, 'a> {
         AlphaFilter { alpha_voids: self, rays, cones }
     }
 
-    /// Whether a ray that asks for its first hit meets prim `prim`, if it does, where nothing is for certain.
+    /// Whether a ray that looks for its first hit certainly meets a gap of prim `prim` where it hits that.
     fn rejects(&self, sight: &Sight, prim: u32) -> bool {
         let known = self.face(prim, 1).filter(|(_, map)| map.has_gaps());
         known.is_some_and(|(face, map)| face.sure(map, &Rays::new([*sight], true)).clear == 1)
     }
 
-    /// Whether prim `prim` stops a ray to a light or lets it through where it is met, if it is, of maps as sharp as they are;
-    /// `None` where that is not known.
+    /// Whether prim `prim` stops a shadow ray where that hits it, or lets it through, with maps read at full resolution; `None`
+    /// where that is uncertain.
     pub(super) fn stops(&self, ray: &Ray, prim: u32) -> Option<bool> {
         let (face, map) = self.face(prim, 1)?;
         let sight = Sight { ray, cone: [0.0; 2], from: f32::NEG_INFINITY };
@@ -178,7 +178,7 @@ impl<'a> AlphaVoids<'a> {
         (sure.clear | sure.solid == 1).then_some(sure.solid == 1)
     }
 
-    /// What is known of a prim that so many rays meet, and its map.
+    /// Face of a prim that `rays` rays have hit, and the survey of its map.
     #[inline]
     fn face(&self, prim: u32, rays: usize) -> Option<(Face, &Survey)> {
         let maps = self.maps.get(rays, || self.survey())?;
@@ -195,7 +195,7 @@ impl<'a> AlphaVoids<'a> {
         Some((face, survey))
     }
 
-    /// The face of a prim, if it is one of a masked mesh.
+    /// Face of a prim; `None` unless it belongs to a masked mesh.
     #[inline(never)]
     fn make(&self, maps: &Maps, prim: u32) -> Option<Face> {
         let PrimSource::Triangle { instance, triangle } = self.world.source(prim) else { return None };
@@ -226,7 +226,7 @@ impl<'a> AlphaVoids<'a> {
 }
 
 impl MaskedMesh<'_> {
-    /// The face of a triangle of an instance, a prim, on a map of this number.
+    /// Face of a triangle of an instance, with its prim, on the map with this index.
     fn face(&self, world: &World, (instance, triangle, prim): (u32, u32, u32), map: u32) -> Option<Face> {
         let Self { cut, mesh, uvs, turn, texels } = *self;
         let corner = |i: u32| uvs.get(i as usize).map_or(Vec2::NAN, |&uv| turn.apply(uv) * texels);
@@ -245,7 +245,7 @@ impl<'a> Cut<'a> {
             return None;
         }
         let least = least_solid(material).map_or(Self::NEVER, |least| code(least, 255));
-        // That nothing is there each says by itself, whatever the other says.
+        // Either map alone can make a gap, whatever the other holds.
         let (map, channel, least) = match (&material.opacity_map, &material.base_color_map) {
             (Some(map), Some(_)) => (map, 0, Self::NEVER),
             (Some(map), None) => (map, 0, least),
@@ -261,15 +261,15 @@ impl<'a> Cut<'a> {
         })
     }
 
-    /// More than any code.
+    /// Higher than any code.
     const NEVER: u16 = 256;
 
-    /// What must be known of which map.
+    /// Map, channel and codes: what a survey is made for.
     fn what(&self) -> (u32, usize, Codes) {
         (self.map.texture, self.channel, self.codes)
     }
 
-    /// A mesh that it cuts out, if that has the map, and nothing makes it more opaque than that says.
+    /// Masks a mesh, if it has the map's coordinates, and no vertex colour makes it more opaque than the map does.
     fn on(self, mesh: &'a Mesh, textures: &TextureStore) -> Option<MaskedMesh<'a>> {
         let uvs = mesh.uvs.get(self.map.uv_set as usize)?;
         let is_part = |color: &Vec4| color.cmpge(Vec4::ZERO).all() && color.cmple(Vec4::ONE).all();
@@ -281,13 +281,13 @@ impl<'a> Cut<'a> {
     }
 }
 
-/// Of 8 bits the highest code of a map with which a material is not there, if there is one.
+/// Highest 8-bit code of a map that makes a gap in a material, if there is one.
 fn most(material: &Material) -> Option<u8> {
     match material.alpha_mode {
         AlphaMode::Opaque => None,
         AlphaMode::Blend => Some(0),
         AlphaMode::Mask { cutoff } => {
-            /// Far more than the mean of four texels is rounded.
+            /// Far more than the rounding of the mean of four texels.
             const ROUNDED: f32 = 1e-3;
             let is_hole = |code: &u8| material.opacity * (f32::from(*code) / 255.0 + ROUNDED) < cutoff;
             (0..=u8::MAX).take_while(is_hole).last()
@@ -295,14 +295,14 @@ fn most(material: &Material) -> Option<u8> {
     }
 }
 
-/// The cones around rays, by number.
+/// Cones around rays, by index.
 #[derive(Clone, Copy)]
 pub(super) enum Cones<'r> {
-    /// Widths and growths.
+    /// Widths and growths of primary rays.
     PrimaryRays([&'r [f32]; 2]),
-    /// What rays carry that start, and what each comes from.
+    /// Paths of rays that start, and the hits that they start from.
     Starting(&'r [Path], &'r [Hit]),
-    /// Of rays of a wave, which go on.
+    /// Paths of rays of a wave that go on.
     Continuing(&'r [Path]),
 }
 
@@ -312,7 +312,7 @@ impl<'r> From<&'r Wave> for Cones<'r> {
     }
 }
 
-/// Rays that look for what is there.
+/// Filter that passes gaps, for rays that look for surfaces.
 pub(super) struct AlphaFilter<'r, 'a> {
     alpha_voids: &'r AlphaVoids<'a>,
     rays: &'r [Ray],
@@ -320,7 +320,7 @@ pub(super) struct AlphaFilter<'r, 'a> {
 }
 
 impl AlphaFilter<'_, '_> {
-    /// A ray and its cone.
+    /// A ray with its cone.
     #[inline]
     fn sight(&self, ray: usize) -> Sight<'_> {
         let of = |path: &Path, before: &Hit| {
@@ -348,7 +348,7 @@ impl IntersectFilter for AlphaFilter<'_, '_> {
         let known = self.alpha_voids.face(prim, rays.count_ones() as usize);
         let Some((face, map)) = known.filter(|(_, map)| map.has_gaps()) else { return 0 };
         while left != 0 {
-            // The next eight, be they neighbours or not.
+            // The next eight rays, adjacent or not.
             let (mut numbers, mut count) = ([left.trailing_zeros(); LANES], 0);
             while left != 0 && count < LANES {
                 numbers[count] = left.trailing_zeros();

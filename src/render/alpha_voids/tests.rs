@@ -8,22 +8,22 @@ use crate::scene::{
     Bitmap, Filter, MetalRough, Mipmaps, Phong, Pixels, Reflection, Sampler, Texture, UvTransform, Wrap,
 };
 
-/// A number of a size between two powers of two.
+/// Random size between two powers of two.
 fn size(random: &mut Random, from: f32, to: f32) -> f32 {
     libm::exp2f(from + (to - from) * random.unit())
 }
 
-/// One of some.
+/// Random element.
 fn one<T: Copy>(random: &mut Random, of: &[T]) -> T {
     of[random.below(of.len())]
 }
 
-/// Mostly what is usual.
+/// `usual` in three of four cases.
 fn mostly<T: Copy>(random: &mut Random, usual: T, odd: &[T]) -> T {
     if random.below(4) == 0 { one(random, odd) } else { usual }
 }
 
-/// A map with bars of holes, and what is near the edge of being one in them.
+/// A map with bars of holes, some of whose texels are close to the threshold.
 fn barred(random: &mut Random, (width, height): (u32, u32), most: u8) -> Bitmap {
     let (mut columns, mut filled) = (Vec::new(), false);
     while columns.len() < width as usize {
@@ -36,7 +36,7 @@ fn barred(random: &mut Random, (width, height): (u32, u32), most: u8) -> Bitmap 
     Bitmap { name: String::new(), width, height, pixels: Pixels::Rgba8(texels.collect()) }
 }
 
-/// A material that a map cuts out, in all the ways that there are, and some that do not work.
+/// A material cut out by a map, in all possible ways, and some that do not work.
 fn cut_out(random: &mut Random) -> Material {
     let glass = Reflection::Phong(Phong { transmission: Vec3::splat(0.5), ..Phong::default() });
     let matt = Reflection::MetalRough(MetalRough::default());
@@ -107,7 +107,7 @@ fn scene(random: &mut Random) -> Scene {
     scene
 }
 
-/// A ray to somewhere in a triangle, and its cone.
+/// A ray to a random point of a triangle, and its cone.
 fn toward(random: &mut Random, corners: [Vec3; 3], prim: u32) -> (Ray, [f32; 2]) {
     let (mut u, mut v) = (random.unit(), random.unit());
     if u + v > 1.0 {
@@ -140,7 +140,7 @@ fn what_is_said_to_be_a_void_is_shaded_as_nothing_and_what_is_said_to_stop_light
         let accel = AnyAccel::build(AccelKind::None, &world.shapes, &AccelParams::DEFAULT);
         for prim in (0..world.triangles()).flat_map(|prim| std::iter::repeat_n(prim, 400)) {
             let (ray, cone) = toward(&mut random, world.triangle(prim), prim);
-            // Where it meets this one, whatever else it meets.
+            // Its hit with this prim, whatever else it hits.
             let mut met = [Hit::BEFORE_ALL];
             while met[0].is_some() || met[0] == Hit::BEFORE_ALL {
                 let after = met;

@@ -1,4 +1,4 @@
-//! What a picture will take and how wrong it will be, foretold from a part of it.
+//! Forecast of a picture's cost and error from a part of it.
 
 pub(super) mod part;
 pub(super) mod target;
@@ -11,22 +11,22 @@ use crate::accel::{NoProbe, RayCounts};
 use crate::stopwatch::Stopwatch;
 use part::{Measure, Part, Quiet, squared_errors, squares};
 
-/// A number that was estimated, and what it lies between with 95 % confidence.
+/// An estimate with its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// The estimate.
     pub value: f64,
-    /// The least that it may be.
+    /// Lower end of the interval.
     pub low: f64,
-    /// The most.
+    /// Upper end.
     pub high: f64,
 }
 
 impl Interval {
-    /// The sum of such values over that of their weights, times `scale`; how far off a single one is remains unknown.
-    /// (W. G. Cochran, *Sampling Techniques*, 1977, §6.4: how far a ratio is off.)
+    /// Ratio of the sum of such values to that of their weights, times `scale`; with a single value the error is unknown. (W. G.
+    /// Cochran, *Sampling Techniques*, 1977, §6.4: the error of a ratio.)
     pub(super) fn of_ratio(weighted: &[(f64, f64)], scale: f64) -> Self {
-        /// Standard errors to both sides.
+        /// Half-width in standard errors.
         const REACH: f64 = 1.96;
         let n = weighted.len() as f64;
         let (values, weights) = weighted.iter().fold((0.0, 0.0), |(vs, ws), (v, w)| (vs + v, ws + w));
@@ -36,43 +36,43 @@ impl Interval {
         Self { value: ratio * scale, low: (ratio - half).max(0.0) * scale, high: (ratio + half) * scale }
     }
 
-    /// Each number as `f` of it, which must grow with it.
+    /// Applies an increasing function `f` to all three numbers.
     pub(super) fn map(self, f: impl Fn(f64) -> f64) -> Self {
         Self { value: f(self.value), low: f(self.low), high: f(self.high) }
     }
 
-    /// Whether a value lies in it.
+    /// Whether a value lies in the interval.
     pub fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
 }
 
-/// What a picture will take.
+/// Forecast cost of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
-    /// Pixels that were rendered to find out.
+    /// Number of pixels rendered for the forecast.
     pub looked_at: u64,
-    /// Pixels of the picture.
+    /// Number of pixels of the picture.
     pub pixels: u64,
-    /// Seconds of processor time for its rays and their shading.
+    /// Processor time for its rays and their shading, seconds.
     pub cpu: Interval,
-    /// Eye rays.
+    /// Number of eye rays.
     pub rays: Interval,
-    /// Ray/prim tests of all rays.
+    /// Number of ray/prim tests of all rays.
     pub tests: Interval,
-    /// Root mean square error in the numbers that sampling counts errors in; `None` where every rendering is the same, so
-    /// that nothing can be told from their differences.
+    /// Root mean square error in the units in which sampling measures errors; `None` where every rendering is the same, so that
+    /// differences say nothing.
     pub rmse: Option<Interval>,
 }
 
-/// Foretells the rendering of a job from about a hundredth of its pixels, at least some thousands: rendered twice, with
-/// different random numbers. `None` when cancelled.
+/// Forecasts the rendering of a job from about a hundredth of its pixels, at least some thousands: rendered twice, with different
+/// random numbers. `None` when cancelled.
 pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
     let mut context = Context::new(job.scene, job.world, job.textures, job.settings);
     let watch = Stopwatch::of_all_threads();
     let (looked, _) = fireflies::look::<NoProbe>(job, &mut context, Closely::Hint, &Quiet(progress));
     let spent = watch.read().cpu.as_secs_f64();
-    // What is asked for as an error is first found out how to reach; the rendering will do that again.
+    // For a target error the settings are planned first; the rendering will plan them again.
     let (settings, work, before) = match job.settings.sampling {
         Sampling::Stochastic(how) if how.target.is_some() => {
             let plan = target::plan::<NoProbe>(job, &context, &how, &Quiet(progress))?;
@@ -81,7 +81,7 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
         _ => (job.settings.clone(), 1.0, (0.0, 0.0)),
     };
     let times = Closely::Hint.part() as f64;
-    // What the picture has of that is in its parts.
+    // The share of this work inside the picture is part of the squares' cost.
     let beside = looked.beside as f64 / looked.all.max(1) as f64;
     let before = (before.0 + looked.beside as f64 * times, before.1 + spent * beside * times);
     let squares = squares(settings.width, settings.height);
@@ -90,7 +90,7 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
     let counted = Part::<RayCounts>::render(job, &context, &other, &squares, progress)?;
     let pixels = u64::from(settings.width) * u64::from(settings.height);
     let looked_at: u64 = timed.squares.iter().map(|square| square.beauty.len() as u64).sum();
-    // A small square at the edge counts as much as its pixels do.
+    // A smaller square at the edge is weighted by its pixels.
     let per_pixel = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
         timed.squares.iter().enumerate().map(|(i, square)| (value(i), square.beauty.len() as f64)).collect()
     };

@@ -1,4 +1,4 @@
-//! A part of a picture that tells about the whole: small squares of its pixels, spread evenly.
+//! A sample of a picture: small squares of its pixels, spread evenly.
 
 use crate::accel::RayCounts;
 use crate::image::{Developer, Picture};
@@ -17,13 +17,13 @@ use std::time::Duration;
 /// Columns and rows of a square.
 pub(in crate::render) const SIDE: u32 = 8;
 
-/// One square in so many is looked at.
+/// One square in so many is rendered.
 const ONE_IN: usize = 100;
 
-/// Squares at least: what is estimated from them is then right within about a tenth.
+/// Minimum number of squares: estimates from them are correct within about a tenth.
 const LEAST: usize = 128;
 
-/// Squares of a picture of this size: all of them where it is small.
+/// Squares for a picture of this size: all of them where it is small.
 pub(in crate::render) fn squares(width: u32, height: u32) -> Vec<Tile> {
     let (columns, rows) = (width.div_ceil(SIDE), height.div_ceil(SIDE));
     let all = columns as usize * rows as usize;
@@ -44,8 +44,7 @@ pub(in crate::render) fn squares(width: u32, height: u32) -> Vec<Tile> {
     chosen.into_iter().map(square).collect()
 }
 
-/// The `k`th cell of a sequence that leaves no gaps (M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences",
-/// 2018).
+/// The `k`th cell of a low-discrepancy sequence (M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018).
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a number of cells")]
 fn spread(k: u32, columns: u32, rows: u32) -> (u32, u32) {
     let at = |step: f64, cells: u32| {
@@ -55,17 +54,17 @@ fn spread(k: u32, columns: u32, rows: u32) -> (u32, u32) {
     (at(0.754_877_666_246_692_8, columns), at(0.569_840_290_998_053_2, rows))
 }
 
-/// What came of the squares of a picture, in their order.
+/// Renderings of the squares of a picture, in order.
 pub(in crate::render) struct Part<P> {
     pub squares: Vec<TilePixels>,
-    /// Time of the processor for each.
+    /// Processor time of each.
     pub spent: Vec<Duration>,
-    /// Of each.
+    /// Counts of each.
     pub counts: Vec<ByClass<P>>,
 }
 
 impl<P: Observer> Part<P> {
-    /// Renders them in a context that was made for these settings but for their seed; `None` when cancelled.
+    /// Renders the squares in a context that was made for these settings except their seed; `None` when cancelled.
     pub(in crate::render) fn render(
         job: &Job,
         context: &Context,
@@ -75,7 +74,7 @@ impl<P: Observer> Part<P> {
     ) -> Option<Self> {
         let context = context.resampled(settings);
         let (mut finished, complete) = render_some(&context, job.accel, job.view, settings, &Quiet(progress), squares);
-        // Threads finish squares in any order; sums over them have one.
+        // Threads finish squares in any order; sums over them need a fixed one.
         finished.sort_by_key(|Alone { pixels, .. }| (pixels.tile.x0, pixels.tile.y0));
         let mut part = Self { squares: Vec::new(), spent: Vec::new(), counts: Vec::new() };
         for Alone { pixels, spent, counts } in finished {
@@ -90,36 +89,36 @@ impl<P: Observer> Part<P> {
         self.squares.iter().map(|square| square.beauty.len()).sum()
     }
 
-    /// Eye rays that a square would take as a part of whole tiles. Of the pixels around it a square has more, for its size, than
-    /// a tile, and of the first rays through these a tile traces none.
+    /// Number of eye rays that a square would take as a part of whole tiles. A square has more surrounding pixels, for its size,
+    /// than a tile, and a tile does not trace the first rays through these.
     pub(in crate::render) fn rays_in_tiles(&self, square: usize) -> f64 {
         let square = &self.squares[square];
         let around = square.rays_around as f64 * (1.0 - f64::from(SIDE) / f64::from(TILE));
         (square.rays - square.rays_beyond) as f64 - around
     }
 
-    /// Processor time that it would take so.
+    /// Processor time that a square would take as a part of whole tiles.
     pub(in crate::render) fn seconds_in_tiles(&self, square: usize) -> f64 {
         self.spent[square].as_secs_f64() * self.kept_in_tiles(square)
     }
 
-    /// The part of the rays of a square that it would take so.
+    /// Fraction of a square's rays that it would take as a part of whole tiles.
     fn kept_in_tiles(&self, square: usize) -> f64 {
         self.rays_in_tiles(square) / self.squares[square].rays.max(1) as f64
     }
 
-    /// Processor time that all took.
+    /// Processor time of all squares.
     pub(in crate::render) fn seconds(&self) -> f64 {
         self.spent.iter().map(Duration::as_secs_f64).sum()
     }
 
-    /// Processor time of a pixel as a part of whole tiles, on the average.
+    /// Mean processor time of a pixel as a part of whole tiles.
     pub(in crate::render) fn seconds_per_pixel(&self) -> f64 {
         let seconds: f64 = (0..self.squares.len()).map(|i| self.seconds_in_tiles(i)).sum();
         seconds / self.pixels().max(1) as f64
     }
 
-    /// Samples of each, on the average.
+    /// Mean number of samples of a pixel.
     #[expect(clippy::cast_precision_loss, reason = "counts of rays")]
     pub(in crate::render) fn samples_per_pixel(&self) -> f64 {
         let samples =
@@ -127,33 +126,32 @@ impl<P: Observer> Part<P> {
         samples as f64 / self.pixels().max(1) as f64
     }
 
-    /// Eye rays.
+    /// Number of eye rays.
     pub(in crate::render) fn rays(&self) -> u64 {
         self.squares.iter().map(|square| square.rays).sum()
     }
 }
 
 impl Part<RayCounts> {
-    /// Ray/prim tests of a square.
+    /// Number of ray/prim tests of a square.
     fn tests(&self, square: usize) -> u64 {
         let ByClass { primary, shadow, reflected, refracted } = &self.counts[square];
         [primary, shadow, reflected, refracted].map(|counts| counts.n_it).into_iter().sum()
     }
 
-    /// Those that it would take as a part of whole tiles.
+    /// Number of tests that a square would take as a part of whole tiles.
     pub(in crate::render) fn tests_in_tiles(&self, square: usize) -> f64 {
         self.tests(square) as f64 * self.kept_in_tiles(square)
     }
 
-    /// Tests of an eye ray and all that come of it, on the average.
+    /// Mean number of tests of an eye ray and all rays it causes.
     pub(in crate::render) fn tests_per_ray(&self) -> f64 {
         let tests: u64 = (0..self.squares.len()).map(|i| self.tests(i)).sum();
         tests as f64 / self.rays().max(1) as f64
     }
 }
 
-/// Squared error of one of two renderings that have only noise in which to differ, for each square: the sum over its pixels,
-/// and how many these are.
+/// Squared error of one of two renderings that differ by noise only, for each square: the sum over its pixels, and their number.
 pub(in crate::render) fn squared_errors<P, Q>(measure: &Measure, a: &Part<P>, b: &Part<Q>) -> Vec<(f64, f64)> {
     let of_square = |(a, b): (&TilePixels, &TilePixels)| {
         let pixels = a.beauty.len() as f64;
@@ -162,7 +160,7 @@ pub(in crate::render) fn squared_errors<P, Q>(measure: &Measure, a: &Part<P>, b:
     a.squares.iter().zip(&b.squares).map(of_square).collect()
 }
 
-/// The numbers in which errors of a picture are counted.
+/// Measure of the errors of a picture.
 pub(in crate::render) struct Measure {
     output: Option<crate::image::Output>,
     background: Option<Vec3>,
@@ -171,7 +169,7 @@ pub(in crate::render) struct Measure {
 }
 
 impl Measure {
-    /// The numbers of a scene; of stochastic sampling its own, else those of the displayed picture.
+    /// Measure of a job: that of its stochastic sampling, else of the displayed picture.
     pub(in crate::render) fn of(job: &Job) -> Self {
         let space = match job.settings.sampling {
             Sampling::Stochastic(how) => how.space,
@@ -208,7 +206,7 @@ impl Measure {
     }
 }
 
-/// What pixels show: [`Picture::beauty`], and [`Picture::veil`] where there is any.
+/// Shown pixels: [`Picture::beauty`], and [`Picture::veil`] where there is any.
 #[derive(Clone, Copy)]
 pub(in crate::render) struct Shown<'a> {
     pub beauty: &'a [[f32; 4]],
@@ -227,7 +225,7 @@ impl<'a> From<&'a TilePixels> for Shown<'a> {
     }
 }
 
-/// Hears whether to stop, and tells no more than that there is work before that on the picture.
+/// Forwards cancellation, and reports no more than that there is work ahead of the picture.
 pub(in crate::render) struct Quiet<'a>(pub &'a dyn Progress);
 
 impl Progress for Quiet<'_> {

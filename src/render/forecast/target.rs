@@ -1,10 +1,10 @@
-//! A picture as exact as it was asked to be, and hardly more.
+//! Renders a picture to a target error, and hardly better.
 //!
-//! What error a picture has after sampling to a given error of a pixel depends on the scene. So a part of it is sampled
-//! to several, each twice with different random numbers, until the error of the picture is as it should be ([`plan`]). Then
-//! the whole picture is rendered twice; the difference of both tells the error of their mean, whatever was right or wrong
-//! about the forecast, and as that is planned to be too large, a third rendering, seldom a fourth, makes it what was asked.
-//! What hardly any ray of either meets is in neither, and nothing here knows of it.
+//! The error of a picture sampled to a given error per pixel depends on the scene. So a part of it is sampled to several such
+//! errors, each twice with different random numbers, until the error of the picture is as wanted ([`plan`]). Then the whole
+//! picture is rendered twice; the difference of both gives the error of their mean, whatever the quality of the forecast, and as
+//! that error is planned to be too large, a third rendering, seldom a fourth, reaches the target. Detail that hardly any ray of
+//! either hits is missing in both, and goes unnoticed here.
 
 use super::part::{Measure, Part, squared_errors, squares};
 use crate::image::Picture;
@@ -17,39 +17,39 @@ use crate::render::tile::{RenderedTiles, add_channels, render_tiles};
 use crate::render::{ClassCounts, Job, Progress, Rendered, Settings};
 use crate::stopwatch::Stopwatch;
 
-/// The first two renderings are planned to leave this part more than what is asked. A forecast from a part of the picture may
-/// be a third off, where few pixels have most of the error; what is too exact already cannot be taken back, and what is not
-/// exact enough is mended by further renderings, when the error is known.
+/// Factor over the target at which the first two renderings are planned. A forecast from a part of the picture may be a third
+/// off, where few pixels have most of the error; too much precision cannot be undone, and too little is made up for by further
+/// renderings, once the error is known.
 const OVER: f64 = 1.3;
 
-/// Renderings beyond the first two, at most; the first of them is near enough, or the second.
+/// Maximum number of renderings after the first two; usually the first or second of them is close enough.
 const MENDS: u64 = 4;
 
-/// An error is what was asked when it is at most this part more.
+/// Factor over the target within which an error counts as reached.
 const CLOSE: f64 = 1.02;
 
-/// How a target is reached.
+/// Plan to reach a target.
 pub(in crate::render) struct Plan<P> {
     how: Stochastic,
-    /// Fewest samples of a pixel as they were asked for.
+    /// Minimum number of samples of a pixel as requested.
     asked: u32,
-    /// Error of the whole picture that one rendering of it leaves, as foretold.
+    /// Forecast error of the whole picture after one rendering.
     rmse: f64,
-    /// By how much that grows with the error of a pixel: the exponent.
+    /// Exponent with which that grows with the error of a pixel.
     slope: f64,
-    /// How many times the work of one rendering all together take: that many times less is the square of their error.
+    /// Cost of all renderings together, in units of one; the square of the error falls by this factor.
     pub work: f64,
-    /// Eye rays spent on finding this out.
+    /// Number of eye rays spent on planning.
     pub rays: u64,
-    /// Seconds of processor time spent on that.
+    /// Processor time spent on planning, seconds.
     pub spent: f64,
-    /// Seconds of processor time of one rendering, as foretold.
+    /// Forecast processor time of one rendering, seconds.
     cpu: f64,
     counts: Vec<ByClass<P>>,
 }
 
 impl<P: Observer> Plan<P> {
-    /// Nothing is known yet.
+    /// An empty plan.
     fn new(how: &Stochastic) -> Self {
         Self {
             how: Stochastic { target: None, ..*how },
@@ -64,7 +64,7 @@ impl<P: Observer> Plan<P> {
         }
     }
 
-    /// Takes in what two renderings of parts of a picture cost; the samples that a pixel of one has on average.
+    /// Adds the cost of two renderings of parts of a picture; returns the mean number of samples of a pixel in one.
     fn take(&mut self, parts: Vec<Part<P>>, settings: &Settings) -> f64 {
         let pixels = f64::from(settings.width) * f64::from(settings.height);
         self.cpu = parts.iter().map(|part| part.seconds_per_pixel() * pixels * 0.5).sum();
@@ -77,27 +77,27 @@ impl<P: Observer> Plan<P> {
         samples
     }
 
-    /// Learns from two errors of a pixel, and those of the whole picture that they left, how these hang together.
+    /// Updates the exponent from two errors of a pixel, and the errors of the whole picture that they gave.
     fn learn(&mut self, (error, rmse): (f64, f64), (next_error, next_rmse): (f64, f64)) {
         if next_error != error && rmse > 0.0 && next_rmse > 0.0 {
-            // Noise of the estimate must not turn the search round.
+            // Noise of the estimate must not reverse the search.
             self.slope = (libm::log(next_rmse / rmse) / libm::log(next_error / error)).clamp(0.3, 1.5);
         }
     }
 
-    /// Error of another rendering that, mixed with one of error `have`, makes one of error `target`; both weighed by the
-    /// inverse of their squares.
+    /// Error of another rendering that, mixed with one of error `have`, gives error `target`; both weighted by their inverse
+    /// squares.
     fn missing(&self, have: f64, target: f64) -> f64 {
-        /// What is worth rendering: more than so many times as bad adds nothing.
+        /// Limit beyond which a rendering is useless, relative to `have`.
         const WORST: f64 = 3.0;
         let square = 1.0 / (1.0 / (target * target) - 1.0 / (have * have));
         if square > 0.0 { square.sqrt().min(WORST * have) } else { WORST * have }
     }
 
-    /// Aims at another error of a rendering than the last one's.
+    /// Sets the error of a pixel so that a rendering's error changes from `last` to `next`.
     fn aim(&mut self, last: f64, next: f64) {
-        /// From so many times the error on fewer samples are enough for the pixels that get fewest, but not fewer than half of
-        /// what was asked for: all renderings together give them more.
+        /// From this ratio of errors on, the minimum number of samples is halved, but not below half of what was requested: all
+        /// renderings together give pixels more.
         const COARSER: f64 = 1.2;
         if next > COARSER * last {
             self.how.min_samples = (self.how.min_samples / 2).max(self.asked / 2).max(1);
@@ -106,18 +106,18 @@ impl<P: Observer> Plan<P> {
         self.how.error = single((f64::from(self.how.error) * gain).clamp(*RANGE.start(), *RANGE.end()));
     }
 
-    /// The settings of one of its renderings.
+    /// Settings of one of its renderings.
     pub(in crate::render) fn settings(&self, settings: &Settings, number: u64) -> Settings {
         Settings { sampling: Sampling::Stochastic(self.how), seed: seed(settings.seed, number), ..settings.clone() }
     }
 }
 
-/// The seed of the `number`th rendering of a picture; the first has the picture's own.
+/// Seed of the `number`th rendering of a picture; the first has the picture's own.
 pub(in crate::render) fn seed(seed: u64, number: u64) -> u64 {
     seed ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15)
 }
 
-/// Finds the error of a pixel that leaves the error of the picture that is asked for. `None` when cancelled.
+/// Finds the error of a pixel that gives the picture its target error. `None` when cancelled.
 pub(in crate::render) fn plan<P: Observer>(
     job: &Job,
     context: &Context,
@@ -139,7 +139,7 @@ pub(in crate::render) fn plan<P: Observer>(
         }
         let squared = squared_errors(&measure, &parts[0], &parts[1]);
         let of_all = Interval::of_ratio(&squared, 1.0).map(f64::sqrt);
-        // A single square has all pixels of a small picture, or nothing tells how far off it is.
+        // A single square holds all pixels of a small picture, or its error is unknown.
         (plan.rmse, most) = (of_all.value, if of_all.high.is_finite() { of_all.high } else { of_all.value });
         let fewest = how.min_samples.max(fewest(plan.take(parts, job.settings))).min(how.max_samples.max(1));
         if let Some(before) = before.replace((error, plan.rmse)) {
@@ -147,14 +147,14 @@ pub(in crate::render) fn plan<P: Observer>(
         }
         let off = plan.rmse / wanted;
         let is_at_end = off < 1.0 && error >= *RANGE.end() || off > 1.0 && error <= *RANGE.start();
-        // The last try is what is rendered.
+        // The last try is rendered as it is.
         if (0.94..1.06).contains(&off) && fewest == plan.how.min_samples || is_at_end || left == 0 {
             break;
         }
         plan.how.min_samples = fewest;
         error *= libm::pow(1.0 / off.clamp(0.05, 20.0), 1.0 / plan.slope);
     }
-    // Where the fewest samples surely do already, there is no use in doing it twice; where they nearly do, twice is enough.
+    // Where the minimum samples certainly suffice already, a second rendering is useless; where they nearly do, two suffice.
     plan.work = if most <= target {
         1.0
     } else if plan.rmse <= CLOSE * std::f64::consts::SQRT_2 * target {
@@ -165,24 +165,24 @@ pub(in crate::render) fn plan<P: Observer>(
     Some(plan)
 }
 
-/// Errors of a pixel that make sense.
+/// Range of useful errors of a pixel.
 const RANGE: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
 
-/// What pixels should start with, a power of two, when they get so many samples on average: those that see nothing in their
-/// first ones stop, and where many samples are wanted that is an error which more renderings do not lessen.
+/// Number of samples to start pixels with, a power of two, for this mean number of samples: pixels whose first samples miss a
+/// detail stop, and where many samples are wanted that is an error which more renderings do not reduce.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "far less than 2^32 samples, and not negative"
 )]
 fn fewest(samples: f64) -> u32 {
-    /// Part of the samples that all pixels get.
+    /// Fraction of the mean number of samples that all pixels get.
     const SURE: f64 = 0.25;
     const MOST: u32 = 64;
     1 << ((SURE * samples) as u32).clamp(1, MOST).ilog2()
 }
 
-/// Renders until the error of the picture is what was asked; the picture is the mean of several renderings.
+/// Renders until the error of the picture reaches the target; the picture is the mean of several renderings.
 pub(in crate::render) fn render<P: Observer>(
     job: &Job,
     context: &Context,
@@ -209,7 +209,7 @@ pub(in crate::render) fn render<P: Observer>(
         let other = one(&plan.settings(job.settings, 1));
         whole.complete = other.complete;
         let both = measure.mean_square((&whole.picture).into(), (&other.picture).into());
-        // Half of the difference is what each is off their mean.
+        // Half of the difference is the error of each from their mean.
         let mut estimate = 0.5 * both.sqrt();
         mix(&mut whole, &other, 0.5);
         let mut last = (0.5 * both).sqrt();
@@ -244,7 +244,7 @@ pub(in crate::render) fn render<P: Observer>(
     Some((whole, counts))
 }
 
-/// Mixes another rendering in, of which `part` is taken.
+/// Mixes another rendering in, with weight `part`.
 fn mix(whole: &mut Rendered, other: &Rendered, part: f32) {
     let (sampled, more): (&mut Sampled, &Sampled) = (&mut whole.sampled, &other.sampled);
     let parts = parts(&sampled.counts, &more.counts, part);
@@ -260,11 +260,11 @@ fn mix(whole: &mut Rendered, other: &Rendered, part: f32) {
     }
 }
 
-/// What is taken of each pixel of another rendering, of which `part` is taken in all: more where it has more of its samples
+/// Weight of each pixel of another rendering, whose overall weight is `part`: larger where it has a larger share of its samples
 /// than this one has of its own.
 ///
-/// A pixel that saw nothing in its first samples has stopped; where the other rendering saw something it went on until it
-/// knew how much. Of two such means that one is nearly right. And where a rendering was cut short it has no samples.
+/// A pixel whose first samples missed a detail has stopped; where the other rendering hit it, it went on until it was certain. Of
+/// two such means the latter is nearly right. And where a rendering was cut short, it has no samples.
 #[expect(clippy::cast_precision_loss, reason = "counts of rays")]
 fn parts(own: &[u32], other: &[u32], part: f32) -> Vec<f32> {
     let all = |counts: &[u32]| counts.iter().map(|&n| u64::from(n)).sum::<u64>().max(1) as f32;

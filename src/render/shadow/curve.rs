@@ -1,26 +1,26 @@
-//! How far the round surface that a triangle's normals describe rises over the triangle, so that the shadow rays of coarse
-//! smooth meshes start where the surface would be and not under it.
+//! Height over a triangle of the round surface that its normals describe, so that the shadow rays of coarse smooth meshes start
+//! on that surface and not under it.
 
 use crate::accel::{NO_PRIM, Ray};
 use crate::math::Vec3;
 use crate::render::shade::Incident;
 use crate::render::surface::Surface;
 
-/// Cosine between a light and a triangle from which on shadow rays start on the triangle itself; below it they start the
-/// higher the flatter the light is. Rays towards steeper light leave a rounded mesh in any case.
+/// Cosine between light and triangle normal from which on shadow rays start on the triangle itself; below it, the more grazing
+/// the light, the higher they start. Rays to steeper light leave a rounded mesh in any case.
 pub(crate) const STEEP: f32 = 0.1;
 
-/// The corners of a triangle over each other's tangent planes.
+/// Heights of a triangle's corners over each other's tangent planes.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::render) struct Curve {
     /// Unit normals of the corners.
     normals: [Vec3; 3],
-    /// Of the plane at each corner: the heights of all three over it.
+    /// For the tangent plane at each corner, the heights of all three corners over it.
     heights: [Vec3; 3],
 }
 
 impl Curve {
-    /// The triangle with these corners and unit normals there, all on one side.
+    /// Curve of the triangle with these corners and their unit normals, all on one side.
     pub(in crate::render) fn new(vertices: [Vec3; 3], normals: [Vec3; 3]) -> Self {
         let over = |k: usize| {
             let height = |j: usize| (vertices[j] - vertices[k]).dot(normals[k]);
@@ -29,8 +29,8 @@ impl Curve {
         Self { normals, heights: [over(0), over(1), over(2)] }
     }
 
-    /// The way from the point of the triangle with these weights of the corners to the surface: the mean of the ways to the
-    /// corners' tangent planes, of those that it lies under. Zero at the corners, and where the surface is hollow.
+    /// Offset from the point with these barycentric coordinates to the round surface: the weighted mean of the offsets to those
+    /// tangent planes of the corners that it lies under. Zero at the corners, and where the surface is concave.
     ///
     /// J. Hanika, "Hacking the Shadow Terminator" (Ray Tracing Gems II, 2021).
     pub(in crate::render) fn lift(&self, weights: [f32; 3]) -> Vec3 {
@@ -40,18 +40,19 @@ impl Curve {
     }
 }
 
-/// The rays that find what stands between a point and a light.
+/// Rays that test for occlusion between a point and a light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadowRays {
     /// Towards the light.
     pub ray: Ray,
-    /// From the triangle to where that ray starts, if it starts above it: what is in between hides the light as well.
+    /// From the triangle to the start of that ray, if it starts above the triangle: an occluder in between blocks the light as
+    /// well.
     pub riser: Option<Ray>,
 }
 
 impl Surface<'_> {
-    /// The rays that must meet nothing if light that is above the [horizon](Self::horizon) is to arrive here; `None` where
-    /// the triangle itself hides it.
+    /// Rays that must be unoccluded for light above the [horizon](Self::horizon) to arrive here; `None` where the triangle itself
+    /// blocks it.
     pub(crate) fn shadow_rays(&self, incident: &Incident, sample: u32) -> Option<ShadowRays> {
         let cosine = self.geometric.dot(incident.to_light);
         if cosine < STEEP
@@ -61,7 +62,7 @@ impl Surface<'_> {
             let lift = lift * (1.0 - cosine / STEEP).min(1.0);
             let start = foot + lift;
             let (dir, t_max) = incident.shadow_segment(start);
-            // Its own triangle may be in the way of a ray that starts above it.
+            // A ray that starts above its own triangle may hit it.
             let ray = Ray { origin: start, t_min: 0.0, dir, t_max, exclude: NO_PRIM, sample };
             let riser = Ray { origin: foot, t_min: 0.0, dir: lift, t_max: 1.0, exclude: self.target.prim, sample };
             return Some(ShadowRays { ray, riser: Some(riser) });
@@ -72,13 +73,13 @@ impl Surface<'_> {
         Some(ShadowRays { ray: self.shadow_ray(incident, sample), riser: None })
     }
 
-    /// The ray from the triangle itself to a light on either side of it.
+    /// Ray from the triangle itself to a light on either side of it.
     pub(crate) fn shadow_ray(&self, incident: &Incident, sample: u32) -> Ray {
         let (dir, end) = incident.shadow_segment(self.origin(incident.to_light));
         self.ray(dir, end, sample)
     }
 
-    /// The way to the round surface on the side that is seen, where it is more than the rounding of the position.
+    /// Offset to the round surface on the visible side, where it exceeds the rounding of the position.
     fn lift(&self) -> Option<Vec3> {
         let patch = self.patch.as_ref()?;
         let lift = patch.curve(self.side(patch.normal()?))?.lift(patch.weights);
@@ -91,7 +92,7 @@ impl Surface<'_> {
 mod tests {
     use super::*;
 
-    /// Three points of the unit sphere, so many radians apart.
+    /// Three points of the unit sphere, roughly `width` radians apart.
     fn cap(width: f32) -> [Vec3; 3] {
         let corner = |turn: f32| {
             let (sin, cos) = libm::sincosf(turn);

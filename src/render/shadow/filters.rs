@@ -1,7 +1,7 @@
-//! What lets light through on the way of shadow rays, and how much.
+//! Transmission of light through see-through surfaces along shadow rays.
 //!
-//! While a structure looks for anything in the way of a ray, it asks of what is not opaque whether it stops the ray's light
-//! ([`ShadowFilter`]). What does is the answer; holes are passed; all else is noted ([`FilterHits`]) and weakens the light
+//! While a structure searches for an occluder, it asks this filter about each prim that is not opaque ([`ShadowFilter`]). A prim
+//! that blocks the light ends the search; holes are passed; all others are recorded ([`FilterHits`]) and attenuate the light
 //! afterwards, in the order of the hits.
 
 use crate::accel::shapes::Prim;
@@ -22,16 +22,16 @@ use crate::scene::Scene;
 use std::cell::RefCell;
 use std::ops::Range;
 
-/// What a ray is inside of.
+/// Media that a ray is inside of.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::render) struct RayMedia {
     media: Media,
-    /// Up to this t of the ray its light has been lessened by what absorbs it there.
+    /// Parameter t up to which absorption has been applied to the ray's light.
     since: f32,
 }
 
-/// Weakens light by what a surface lets through at the hit that comes next on its way, behind one that was `crossed`, which it
-/// replaces unless it is a hole. What is to arrive unbent ends at glass, but for the surface that it has left.
+/// Attenuates light at the next hit on its way, behind the surface `crossed`, which the hit replaces unless it is a hole. Light
+/// that must arrive unrefracted ends at glass, except for the surface that it has left.
 pub(in crate::render) fn weaken(
     context: &Context,
     (ray, unbent): (&Ray, Option<&Hit>),
@@ -56,7 +56,7 @@ pub(in crate::render) fn weaken(
             (filter, may_have_holes && filter == Vec3::ONE)
         }
     };
-    // What stops light does so among others in its place, too.
+    // A surface that blocks the light does so even among coincident ones.
     if !is_repeated || filter.max_element() <= 0.0 {
         *light *= filter;
     }
@@ -65,11 +65,11 @@ pub(in crate::render) fn weaken(
     }
 }
 
-/// Something that light passes.
+/// A hit that light passes.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::render) struct FilterHit {
     pub hit: Hit,
-    /// What part of it is left behind that, where it is known: neither nothing nor all.
+    /// Transmitted fraction of the light, where it is known: neither 0 nor 1.
     pub left: Option<f32>,
 }
 
@@ -79,7 +79,7 @@ impl From<Hit> for FilterHit {
     }
 }
 
-/// What lets light through in part, each linked with the one before it of the same ray.
+/// Partially transmitting hits, each linked to the previous one of the same ray.
 #[derive(Debug, Default)]
 pub(in crate::render) struct FilterHits {
     passed: Vec<(FilterHit, u32)>,
@@ -88,11 +88,11 @@ pub(in crate::render) struct FilterHits {
 }
 
 impl FilterHits {
-    /// Of rays that have met nothing.
+    /// Marks rays without hits.
     pub(in crate::render) const NOTHING: u32 = u32::MAX;
-    /// Of those that must find it again.
+    /// Marks rays whose hits must be found again.
     pub(in crate::render) const OVERFLOW: u32 = u32::MAX - 1;
-    /// How much is noted at most: 7 MB of it.
+    /// Maximum number of recorded hits: 7 MB.
     const MOST: usize = 1 << 18;
 
     pub(in crate::render) fn begin(&mut self, rays: usize) {
@@ -107,18 +107,18 @@ impl FilterHits {
             *last = Self::OVERFLOW;
             return;
         }
-        // A distance of −0 is none of its own.
+        // −0 is not a distance of its own.
         let hit = Hit { t: passed.hit.t + 0.0, ..passed.hit };
         self.passed.push((FilterHit { hit, ..passed }, *last));
         *last = self.passed.len() as u32 - 1;
     }
 
-    /// What was last noted of a ray.
+    /// Last recorded hit of a ray.
     pub(in crate::render) fn last(&self, ray: usize) -> u32 {
         self.last[ray]
     }
 
-    /// What a ray passes, from the last that was noted on, in the order of its way, each once.
+    /// Lists the hits of a ray, from the last recorded one, in order along the ray, without duplicates.
     pub(in crate::render) fn list(&self, mut noted: u32, list: &mut Vec<FilterHit>) {
         list.clear();
         while let Some(&(passed, before)) = self.passed.get(noted as usize) {
@@ -132,39 +132,39 @@ impl FilterHits {
     }
 }
 
-/// What of a picture's scene lets light through, for shadow rays that are asked again.
+/// See-through surfaces of a picture's scene, for shadow rays that are traced again.
 pub struct Filters<'a>(Context<'a>);
 
-/// What was met on the way of rays that are asked again: room that is used again.
+/// Reusable buffer for the hits of rays that are traced again.
 #[derive(Debug, Default)]
 pub struct FilterScratch(RefCell<FilterHits>);
 
 impl<'a> Filters<'a> {
-    /// `None` where nothing is asked but whether something opaque is in the way.
+    /// `None` where all occluders are opaque.
     pub fn of(scene: &'a Scene, world: &'a World, textures: &'a TextureStore<'a>, settings: &Settings) -> Option<Self> {
         let context = Context::new(scene, world, textures, settings);
         context.asks_filters().then_some(Self(context))
     }
 
-    /// Whether prims stop some rays.
+    /// Filter for these rays.
     pub fn for_rays<'r>(&'r self, rays: &'r [Ray], noted: &'r mut FilterScratch) -> ShadowFilter<'r> {
         noted.0.get_mut().begin(rays.len());
         ShadowFilter::new(&self.0, rays, &noted.0)
     }
 }
 
-/// Rays that ask what stops their light, and what they meet that lets some through.
+/// Decides which prims block shadow rays, and records those that let some light through.
 #[derive(Clone, Copy)]
 pub struct ShadowFilter<'a> {
     context: &'a Context<'a>,
     pub(in crate::render) rays: &'a [Ray],
-    /// The number of the first of them.
+    /// Index of the first ray.
     first: usize,
     filter_hits: &'a RefCell<FilterHits>,
 }
 
 impl<'a> ShadowFilter<'a> {
-    /// All of these rays, for whose hits there is room.
+    /// Filter for all these rays, for whose hits `filter_hits` has room.
     pub(in crate::render) fn new(
         context: &'a Context<'a>,
         rays: &'a [Ray],
@@ -173,7 +173,7 @@ impl<'a> ShadowFilter<'a> {
         Self { context, rays, first: 0, filter_hits }
     }
 
-    /// So many of the rays.
+    /// Filter for a range of the rays.
     pub(in crate::render) fn part(&self, rays: Range<usize>) -> Self {
         Self { first: self.first + rays.start, rays: &self.rays[rays], ..*self }
     }
@@ -208,7 +208,7 @@ impl OccludedFilter for ShadowFilter<'_> {
     }
 }
 
-/// What part of light is left behind a surface, where that is soon said.
+/// Transmitted fraction of light behind a surface, where it is cheap to tell.
 fn left_behind(context: &Context, target: &HitPrim, hit: &Hit) -> Option<f32> {
     if target.material.reflection.transmits() {
         return None;
@@ -216,7 +216,7 @@ fn left_behind(context: &Context, target: &HitPrim, hit: &Hit) -> Option<f32> {
     Some(1.0 - target.material.alpha_mode.covers(target.opacity(hit, context.textures)?))
 }
 
-/// What the surface at `hit` lets through. Maps are read at full sharpness: the shadow's own distance is unknown here.
+/// Transmittance of the surface at `hit`. Maps are read at full resolution: the shadow's own distance is unknown here.
 pub(in crate::render) fn filter_at(
     context: &Context,
     target: &HitPrim,
@@ -240,12 +240,12 @@ pub(in crate::render) fn filter_at(
 }
 
 impl RayMedia {
-    /// What a ray starts inside of.
+    /// State of a ray that starts inside these media.
     pub(in crate::render) fn of(media: Media) -> Self {
         Self { media, since: 0.0 }
     }
 
-    /// Goes in or out through the surface of a material: what is left of the light before that.
+    /// Crosses the surface of a material; returns the transmittance of the medium before it.
     fn cross(
         &mut self,
         (table, absorption): (&mut MediaTable, &Absorption),
@@ -254,7 +254,7 @@ impl RayMedia {
         hit: &Hit,
     ) -> Vec3 {
         let crossing = table.cross(self.media, Medium { material, ior: 1.0 }, entering);
-        // What is left without having been entered was all around from the start.
+        // A medium left without having been entered was around the ray from the start.
         let before = if !entering && self.media == crossing.beyond {
             absorption.by(material)
         } else {
@@ -274,7 +274,7 @@ mod tests {
     const THIN: Vec3 = Vec3::new(0.0, 0.1, 1.0);
     const DENSE: Vec3 = Vec3::new(2.0, 0.2, 0.0);
 
-    /// What is left where a ray of length 2 for each t meets faces of two volumes: (t, which, whether it enters).
+    /// Transmittance where a ray of length 2 per unit of t crosses faces of two volumes: (t, which, whether it enters).
     fn left(crossings: &[(f32, u32, bool)]) -> Vec3 {
         let dir = Vec3::new(0.0, 0.0, 2.0);
         let ray = Ray { origin: Vec3::ZERO, t_min: 0.0, dir, t_max: 9.0, exclude: NO_PRIM, sample: 0 };
@@ -295,7 +295,7 @@ mod tests {
             transmittance(THIN, 3.0)
         ));
         assert!(near(left(&[(1.5, 0, false)]), transmittance(THIN, 3.0)), "from inside");
-        // A dense one inside a thin one.
+        // A dense volume inside a thin one.
         let nested = left(&[(1.0, 0, true), (2.0, 1, true), (2.25, 1, false), (4.0, 0, false)]);
         assert!(near(nested, transmittance(THIN, 5.5) * transmittance(DENSE, 0.5)), "{nested}");
     }

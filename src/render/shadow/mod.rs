@@ -1,4 +1,4 @@
-//! Shadow rays, to lights and to the surroundings, traced in waves.
+//! Shadow rays, to lights and to the environment, traced in waves.
 
 pub(super) mod curve;
 pub(super) mod filters;
@@ -16,25 +16,25 @@ use crate::math::Vec3;
 use bytemuck::{Pod, Zeroable};
 use std::cell::RefCell;
 
-/// Shadow rays that wait, each with the light it lets through. Buffers of one worker.
+/// Queued shadow rays, each with the light it carries. Buffers of one worker.
 #[derive(Debug, Default)]
 pub(crate) struct ShadowQueue {
     rays: Tail<Ray>,
     light: Tail<Bound>,
-    /// What each is inside of; empty where nothing absorbs light.
+    /// Media of each ray; empty where nothing absorbs light.
     ray_media: Vec<RayMedia>,
-    /// Of rays that end at what would bend or spread them the hit that each has left, with `t` as far as it may meet the same
+    /// For rays that end at refracting or scattering surfaces: the hit that each has left, with `t` as far as it may hit the same
     /// surface again.
     unbent: Vec<Hit>,
-    /// The ways up to where some of the rays start, and which those are.
+    /// Rays up to the raised starts of some of the rays, and the indices of these rays.
     risers: Vec<Ray>,
     raised: Vec<usize>,
     occluded: Vec<bool>,
-    /// What they meet that lets light through in part, and that of one of them in order.
+    /// Partially transmitting hits, and those of one ray in order.
     filter_hits: RefCell<FilterHits>,
     in_order: Vec<FilterHit>,
-    /// Those that go on from surface to surface: their numbers, the rays, the hit that each has passed last, the last that was
-    /// no hole, and the one behind.
+    /// Rays that go on from surface to surface: their indices, the rays, the hit that each has passed last, the last one that was
+    /// no hole, and the next hit.
     going: Vec<usize>,
     on_way: Vec<Ray>,
     after: Vec<Hit>,
@@ -42,12 +42,12 @@ pub(crate) struct ShadowQueue {
     hits: Vec<Hit>,
 }
 
-/// Light that arrives if nothing is in the way.
+/// Light that arrives if the ray is unoccluded.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Bound {
     pub radiance: Vec3,
-    /// Where it arrives: its ray's sample, or what else its sender has said.
+    /// Destination of the light: the sample of its ray, or a tag of the sender's.
     pub tag: u32,
 }
 
@@ -56,8 +56,8 @@ impl ShadowQueue {
         self.rays.len()
     }
 
-    /// Adds a ray; `light` is what its sample sees if nothing is in the way, `media` what it starts inside of: of all rays of
-    /// an image, or of none.
+    /// Adds a ray; `light` is the contribution to its sample if it is unoccluded, `media` those it starts inside of: given for
+    /// all rays of an image, or for none.
     pub(crate) fn push(&mut self, ray: Ray, light: Vec3, media: Option<Media>) {
         self.push_bound(ray, Bound { radiance: light, tag: ray.sample }, media);
     }
@@ -71,27 +71,27 @@ impl ShadowQueue {
         self.push(shadow_rays.ray, light, media);
     }
 
-    /// Adds a ray that ends at glass, and has left this hit, with `t` as far as it may meet the same surface again: all rays, or
-    /// none.
+    /// Adds a ray that ends at glass, and has left this hit, with `t` as far as it may hit the same surface again: used for all
+    /// rays, or for none.
     pub(crate) fn push_unbent(&mut self, ray: Ray, left: Hit, light: Vec3, media: Option<Media>) {
         self.push(ray, light, media);
         self.unbent.push(left);
     }
 
-    /// Adds a ray whose light need not be bound for its sample.
+    /// Adds a ray whose light may go elsewhere than to its sample.
     pub(crate) fn push_bound(&mut self, ray: Ray, light: Bound, media: Option<Media>) {
         self.rays.push(ray);
         self.light.push(light);
         self.ray_media.extend(media.map(RayMedia::of));
     }
 
-    /// Room for `N` more rays, and for the light of each; [`Self::take`] takes those that came.
+    /// Room for `N` more rays, and for the light of each; [`Self::take`] appends those written.
     pub(crate) fn room<const N: usize>(&mut self) -> (&mut [Ray; N], &mut [Bound; N]) {
         (self.rays.room(Ray::zeroed()), self.light.room(Bound::zeroed()))
     }
 
-    /// Takes the first so many of the rays that were written into the [`Self::room`], with what each starts inside of where
-    /// something absorbs light.
+    /// Appends the first `count` rays that were written into the [`Self::room`], with the media each starts inside of where
+    /// anything absorbs light.
     pub(crate) fn take(&mut self, count: usize, media: impl Iterator<Item = Media>) {
         self.rays.grow(count);
         self.light.grow(count);
@@ -107,7 +107,7 @@ impl ShadowQueue {
         self.raised.clear();
     }
 
-    /// Traces all rays and hands what arrives to `arrive`, as (sample or tag, light) in the order of the rays.
+    /// Traces all rays and passes arriving light to `arrive`, as (sample or tag, light) in the order of the rays.
     pub(crate) fn trace<A: Accel, P: Observer>(
         &mut self,
         (context, media): (&Context, &mut MediaTable),
@@ -138,8 +138,8 @@ impl ShadowQueue {
         self.clear();
     }
 
-    /// Weakens the light of rays by all that they have met, in the order of the hits; of those that have met too much to note
-    /// it all, tells that they go on by themselves.
+    /// Attenuates the light of rays by all their recorded hits, in order; rays with too many hits to record are added to those
+    /// that go on by themselves.
     fn pass(&mut self, context: &Context, media: &mut MediaTable) {
         let filter_hits = self.filter_hits.get_mut();
         for i in 0..self.rays.len() {
@@ -170,7 +170,7 @@ impl ShadowQueue {
         }
     }
 
-    /// Walks through what is on the way of those that go on, one surface of each ray a time.
+    /// Traces the rays that go on, one surface of each at a time.
     fn go_through<A: Accel, P: Observer>(
         &mut self,
         (context, media): (&Context, &mut MediaTable),
@@ -195,7 +195,7 @@ impl ShadowQueue {
         }
     }
 
-    /// Blocks the rays whose starts are cut off from their surfaces, and weakens those that are so in part.
+    /// Blocks the rays whose starts are cut off from their surfaces, and attenuates those that partly are.
     fn climb<A: Accel, P: Observer>(&mut self, context: &Context, caster: &mut RayCaster<A>, probe: &mut P) {
         if self.risers.is_empty() {
             return;
@@ -206,7 +206,7 @@ impl ShadowQueue {
             self.raised.iter().zip(cut_off).for_each(|(&i, cut_off)| self.occluded[i] |= cut_off);
             return;
         }
-        // What they meet is asked itself, so that it does not matter of what it is known that it stops light.
+        // Each hit is evaluated itself, so prims known to be opaque need no special case.
         let (mut rays, mut raised) = (self.risers.clone(), self.raised.clone());
         let mut hits = vec![Hit::MISS; rays.len()];
         caster.closest(&rays, &mut hits, probe);
@@ -233,7 +233,7 @@ impl ShadowQueue {
         }
     }
 
-    /// Weakens the light of rays that have met something more, and blocks those it leaves dark; the others go on.
+    /// Attenuates the light of rays at their next hits, and drops those left dark; the others go on.
     fn filter(&mut self, context: &Context, media: &mut MediaTable) {
         let mut kept = 0;
         for k in 0..self.going.len() {
@@ -258,7 +258,7 @@ impl ShadowQueue {
     }
 }
 
-/// Whether nothing is left of light, or nothing that is a number.
+/// Whether light is black or NaN.
 fn is_dark(light: Vec3) -> bool {
     let shines = light.max_element() > 0.0;
     !shines

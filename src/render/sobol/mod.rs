@@ -1,19 +1,19 @@
-//! Points that fill squares and cubes evenly, in a random order of their own for every key.
+//! Low-discrepancy points in squares and cubes, in a random order of their own for every key.
 //!
-//! The sequence is I. M. Sobol's (1967) with the direction numbers of S. Joe and F. Y. Kuo, "Constructing Sobol Sequences
-//! with Better Two-Dimensional Projections" (2008), scrambled after A. B. Owen (1995) by hashing, as in B. Burley,
-//! "Practical Hash-based Owen Scrambling" (2020), with N. Vegdahl's permutation ("Building a Better LK Hash", 2021).
-//! Every scrambling by itself is distributed evenly over the cube, so that the mean of a function over its points is
-//! right on the average, and scramblings of different keys are independent.
+//! The sequence is I. M. Sobol's (1967) with the direction numbers of S. Joe and F. Y. Kuo, "Constructing Sobol Sequences with
+//! Better Two-Dimensional Projections" (2008), scrambled after A. B. Owen (1995) by hashing, as in B. Burley, "Practical
+//! Hash-based Owen Scrambling" (2020), with N. Vegdahl's permutation ("Building a Better LK Hash", 2021). Each point of a
+//! scrambling is uniformly distributed over the cube, so that the mean of a function over the points is unbiased, and scramblings
+//! of different keys are independent.
 
 mod square;
 
 pub(super) use square::square;
 
-/// Dimensions that are stratified together.
+/// Number of dimensions that are stratified together.
 pub(super) const DIMENSIONS: usize = 4;
 
-/// For each dimension and each byte of an index what its bits contribute.
+/// Contribution of each byte of an index, for each dimension.
 static TABLES: [[[u32; 256]; 4]; DIMENSIONS] = tables();
 
 /// Degree, inner coefficients and first direction numbers of each dimension's primitive polynomial after the first.
@@ -74,13 +74,13 @@ fn sobol(index: u32, dimension: usize) -> u32 {
     table[0][a as usize] ^ table[1][b as usize] ^ table[2][c as usize] ^ table[3][d as usize]
 }
 
-/// Turns the bits of a fraction, each by a choice that depends on the bits above it.
+/// Flips the bits of a fraction, each depending on the bits above it.
 #[inline]
 fn scramble(x: u32, key: u32) -> u32 {
     turned(x.reverse_bits(), key).reverse_bits()
 }
 
-/// [`scramble`] of reversed bits: those above come first, as the lowest.
+/// [`scramble`] of reversed bits: the upper bits become the lowest.
 #[inline(always)]
 fn turned(mut x: u32, key: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
@@ -90,7 +90,7 @@ fn turned(mut x: u32, key: u32) -> u32 {
     x ^ x.wrapping_mul(0x53a2_2864)
 }
 
-/// Thirty-two bits that two numbers decide, no part of which shows in them.
+/// Hashes two numbers to 32 bits.
 #[inline(always)]
 pub(in crate::render) fn mix(a: u32, b: u32) -> u32 {
     // The finalizer of A. Appleby's MurmurHash3 (2011), once for each word.
@@ -152,8 +152,8 @@ mod tests {
 
     #[test]
     fn keys_give_independent_sequences() {
-        // The mean of x·y over the first points of many keys, and how the first points of keys beside each other go
-        // together: each a sum of independent numbers when keys are.
+        // The mean of x·y over the first points of many keys, and the correlation of the first points of adjacent keys: each a
+        // sum of independent numbers when keys are.
         let n = 20_000_u32;
         let first: Vec<[f64; 2]> = (0..=n).map(|key| point::<2>(0, mix(5, key))).collect();
         let mean = |f: &dyn Fn(usize) -> f64| (0..n as usize).map(f).sum::<f64>() / f64::from(n);
@@ -163,7 +163,7 @@ mod tests {
             ("x and y", mean(&|i| centred(i, 0) * centred(i, 1) * 3.46)),
             ("neighbours", mean(&|i| centred(i, 0) * centred(i + 1, 0) * 3.46)),
         ] {
-            // Four standard errors of a number spread evenly over 0…1.
+            // Four standard errors of a number uniform over 0…1.
             assert!(found.abs() < 4.0 * 0.2887 / f64::from(n).sqrt(), "{what}: {found}");
         }
     }
@@ -177,7 +177,7 @@ mod tests {
             (sum / f64::from(n) - 0.676_889_5).powi(2)
         };
         let mse = (0..64).map(|k| squared(mix(9, k))).sum::<f64>() / 64.0;
-        // By chance the variance is 0.06 / 256.
+        // Random points would have the variance 0.06 / 256.
         assert!(mse < 1e-7, "{mse}");
     }
 }

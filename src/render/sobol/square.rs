@@ -1,11 +1,11 @@
-//! The first two coordinates of a point, for loops over many.
+//! The first two coordinates of a point, for vectorised loops.
 //!
-//! The same numbers as [`super::point`] gives, without its tables: of these two dimensions the bits of a point are a formula of
-//! the bits of its index, which the compiler turns into lanes.
+//! The same numbers as those of [`super::point`], without its tables: in these two dimensions the bits of a point are a closed
+//! formula of the bits of its index, which the compiler vectorises.
 
 use super::{mix, turned};
 
-/// [`super::point`] of two dimensions.
+/// [`super::point`] in two dimensions.
 #[inline(always)]
 pub(in crate::render) fn square(index: u32, key: u32) -> [f64; 2] {
     let index = turned(index.reverse_bits(), key).reverse_bits();
@@ -19,8 +19,8 @@ fn fraction(x: u32) -> f64 {
     f64::from(x) / 4_294_967_296.0
 }
 
-/// The bits of the second dimension, the last first. Its direction numbers are the powers of 1 + x, as polynomials over
-/// bits: this puts 1 + x for x, and as (1 + x)ᵏ is 1 + xᵏ where k is a power of two, it takes five steps.
+/// Bits of the second dimension, the last first. Its direction numbers are the powers of 1 + x, as polynomials over bits: this
+/// substitutes 1 + x for x, and as (1 + x)ᵏ is 1 + xᵏ where k is a power of two, it takes five steps.
 #[inline(always)]
 fn shifted(mut index: u32) -> u32 {
     index ^= index >> 1 & 0x5555_5555;

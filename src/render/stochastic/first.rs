@@ -1,4 +1,4 @@
-//! The first sample of every pixel, and what it shows: in columns, since most pixels need no more.
+//! The first sample of every pixel and what it shows, in columns, since most pixels need no more.
 
 use super::Sampler;
 use super::neighborhood::Neighborhood;
@@ -14,22 +14,22 @@ use crate::render::observer::Observer;
 use crate::render::tile::{BLOCK, TOGETHER, Tile, TilePixels};
 use crate::render::whitted::{Sample, Tracer};
 
-/// One sample of every pixel of some parts of the picture: part after part, and each in the order of its places.
+/// One sample of every pixel of some parts of the picture: part after part, each in the order of its places.
 pub(super) struct First {
-    /// The parts, and the number of the first pixel of each.
+    /// The parts, each with the index of its first pixel.
     parts: Vec<(Tile, usize)>,
     samples: Vec<Sample>,
-    /// Whether rays of each were spread by chance; empty where none may be.
+    /// Whether rays of each sample were spread at random; empty where none can be.
     by_chance: Vec<bool>,
-    /// What layers are made of; empty unless they are wanted.
+    /// First surfaces for the layers; empty unless layers are wanted.
     firsts: Vec<FirstSurface>,
-    /// The pixels that they are.
+    /// The pixels that these samples make.
     pixels: Pixels,
     shown: Shown,
 }
 
 impl Sampler<'_> {
-    /// Traces the first sample of every pixel of these parts, all together; `None` when cancelled.
+    /// Traces the first sample of every pixel of these tiles, all together; `None` when cancelled.
     pub(super) fn first<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
@@ -65,7 +65,7 @@ impl Sampler<'_> {
 }
 
 impl First {
-    /// Tells the pixels of a tile, of those that are among these, whose rays were spread by chance.
+    /// Passes to `tell` the pixels of a tile, as far as they are among these, whose rays were spread at random.
     pub(super) fn each_by_chance(&self, tile: Tile, mut tell: impl FnMut((u32, u32))) {
         let parts = self.parts.iter().filter(|(part, _)| !self.by_chance.is_empty() && part.meets(tile));
         for &(part, start) in parts {
@@ -74,7 +74,7 @@ impl First {
         }
     }
 
-    /// Gives a pixel its first sample, if that is among these.
+    /// Gives a pixel its first sample, if the pixel is among these.
     pub(super) fn give(&self, pixel: &mut Pixel, fireflies: Option<&Fireflies>) {
         let Some(&(part, start)) = self.parts.iter().find(|(part, _)| part.contains(pixel.at)) else { return };
         let own = start + part.number(pixel.at);
@@ -82,7 +82,7 @@ impl First {
         pixel.take(&self.samples[own..=own], self.firsts.get(own..=own).unwrap_or_default(), 1);
     }
 
-    /// Copies what it shows of what lies around a tile.
+    /// Copies what these samples show of a tile and its surroundings.
     pub(super) fn show(&self, around: &mut Neighborhood) {
         let (inner, columns) = (around.tile, around.columns());
         for &(part, mut from) in self.parts.iter().filter(|(part, _)| part.meets(inner)) {
@@ -102,11 +102,11 @@ impl First {
         }
     }
 
-    /// Puts the pixels of a tile into their places, as they are with one sample.
+    /// Stores the pixels of a tile, as they are with one sample.
     pub(super) fn put(&self, frame: &Frame, done: &mut TilePixels) {
         let tile = done.tile;
         for &(part, mut from) in self.parts.iter().filter(|(part, _)| tile.contains((part.x0, part.y0))) {
-            // Blocks of a part are blocks of its tile.
+            // The blocks of a part are blocks of its tile.
             for block in part.blocks() {
                 let (to, count) = (tile.number((block.x0, block.y0)), block.pixels());
                 done.beauty[to..to + count].copy_from_slice(&self.pixels.beauty[from..from + count]);
@@ -123,13 +123,13 @@ impl First {
     }
 }
 
-/// Copies a rectangle of a block's numbers between arrays with so many to a row.
+/// Copies a rectangle of a block's values between arrays with these row strides.
 #[inline(always)]
 fn copy((to, to_step): (&mut [f32], usize), (from, from_step): (&[f32], usize), [width, height]: [usize; 2]) {
-    /// Columns and rows of a whole block, and columns of one at the border of what is seen around a tile.
+    /// Side of a whole block, and width of one at the border of a tile's surroundings.
     const SIDE: usize = BLOCK as usize;
     const HALF: usize = SIDE / 2;
-    // The usual sizes, without a call.
+    // The usual sizes are inlined.
     match (width, from_step, height) {
         (SIDE, SIDE, SIDE) => copy_rows::<SIDE>((to, to_step), (from, SIDE), SIDE),
         (SIDE, ..) => copy_rows::<SIDE>((to, to_step), (from, from_step), height),
@@ -140,7 +140,7 @@ fn copy((to, to_step): (&mut [f32], usize), (from, from_step): (&[f32], usize), 
     }
 }
 
-/// Copies rows of one width.
+/// Copies rows of a constant width.
 #[inline(always)]
 fn copy_rows<const WIDTH: usize>(
     (to, to_step): (&mut [f32], usize),

@@ -1,10 +1,9 @@
-//! Stochastic sampling of a tile: its pixels advance together in rounds, and only those that are not certain yet go into
-//! the next.
+//! Stochastic sampling of a tile: its pixels advance together in rounds, and only those that are not yet certain enter the next.
 //!
-//! What decides about a pixel are its own samples, and in the first rounds those of the pixels beside it ([`neighborhood`]): a
-//! pixel that happens to see nothing of what its neighbours see goes on with them. Pixels around the tile are therefore
-//! looked at in these rounds, too. Where pixels start with one sample, tiles share these ([`shared`]); all others are traced by
-//! this tile for itself, and counted: which there are depends on all of a tile, and no tile may wait for another to be done.
+//! A pixel is judged by its own samples, and in the first rounds also by those of its neighbours ([`neighborhood`]): a pixel that
+//! happens to miss a detail that its neighbours see goes on with them. Pixels around the tile are therefore sampled in these
+//! rounds, too. Where pixels start with one sample, tiles share these ([`shared`]); all further samples this tile traces for
+//! itself, and counts: which they are depends on the whole tile, and no tile may wait for another to finish.
 
 mod first;
 mod neighborhood;
@@ -34,10 +33,10 @@ pub(in crate::render) use places::{Places, Wanted};
 pub(super) use shared::render_all;
 use std::ops::Range;
 
-/// Samples at which variances are first relied on: one in each group.
+/// Number of samples from which variances are used: one in each group.
 const FIRST_LOOK: u32 = GROUPS as u32;
 
-/// Renders one tile for itself; `None` when cancelled.
+/// Renders one tile by itself; `None` when cancelled.
 pub(super) fn render<A: Accel, P: Observer>(
     frame: &Frame,
     how: &Stochastic,
@@ -58,28 +57,28 @@ pub(super) fn render<A: Accel, P: Observer>(
     Some(done)
 }
 
-/// What samples all tiles of a picture.
+/// Sampler of all tiles of a picture.
 struct Sampler<'a> {
     frame: &'a Frame<'a>,
     how: &'a Stochastic,
     judge: Certainty<'a>,
     fireflies: Option<&'a Fireflies>,
-    /// First samples of each pixel that are traced before the picture.
+    /// Number of first samples of each pixel that are traced before the picture.
     first_samples: u32,
-    /// The first samples, if they were kept: they are not where only what a picture takes is foretold.
+    /// The samples traced ahead, if they were kept; a mere forecast of the picture's cost does not keep them.
     ahead: Option<&'a Ahead>,
-    /// Samples of a pixel after each round.
+    /// Number of samples of a pixel after each round.
     rounds: Vec<u32>,
 }
 
-/// A tile on its way.
+/// A tile in progress.
 struct Course {
     tile: Tile,
-    /// What is seen of it and around it.
+    /// What the samples of the tile and its surroundings show.
     around: Neighborhood,
-    /// Pixels that have, or get, more than one sample.
+    /// Pixels that have more than one sample, or get more.
     pixels: Vec<Pixel>,
-    /// Those that go on, by number.
+    /// Indices of the pixels that go on.
     active: Vec<usize>,
     /// Buffers.
     places: Places,
@@ -100,13 +99,13 @@ impl<'a> Sampler<'a> {
         self.rounds[0] == 1
     }
 
-    /// How far around a tile pixels are looked at: one farther for each look that decides something, which none does after the
-    /// last round.
+    /// Number of rings of pixels around a tile that are sampled: one for each round that compares neighbours and is followed by
+    /// another round.
     fn reach(&self) -> usize {
         looks(&self.rounds).min(self.rounds.len() - 1)
     }
 
-    /// A tile with so many rings of pixels around it.
+    /// A tile grown by so many rings of pixels.
     fn grown(&self, tile: Tile, rings: usize) -> Tile {
         let Settings { width, height, .. } = *self.frame.settings;
         (0..rings).fold(tile, |tile, _| tile.grown(width, height))
@@ -116,8 +115,7 @@ impl<'a> Sampler<'a> {
         Pixel::new(self.frame.settings.seed, at, self.frame.settings.layers)
     }
 
-    /// Renders a tile, from the first samples of it and of all that is looked at around it where pixels start with one; `None`
-    /// when cancelled.
+    /// Renders a tile, from the first samples of it and of its surroundings where pixels start with one; `None` when cancelled.
     fn finish<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
@@ -125,7 +123,7 @@ impl<'a> Sampler<'a> {
         first: &[&First],
     ) -> Option<TilePixels> {
         let (mut course, mut done) = self.begin(tile, first);
-        // How many samples of each pixel are there already: those of the first round, or none.
+        // Number of samples that each pixel has already: that of the first round, or none.
         let taken = u32::from(self.starts_with_one());
         let mut from = taken;
         for (round, &to) in self.rounds.iter().enumerate().skip(usize::from(taken == 1)) {
@@ -152,7 +150,7 @@ impl<'a> Sampler<'a> {
         Some(done)
     }
 
-    /// What a tile begins with, and what is done of it then.
+    /// State of a tile at the start, and its pixels as far as they are done then.
     fn begin(&self, tile: Tile, first: &[&First]) -> (Course, TilePixels) {
         let reach = self.reach();
         let mut around = Neighborhood::new(self.grown(tile, reach), first);
@@ -170,8 +168,8 @@ impl<'a> Sampler<'a> {
         (Course { tile, around, pixels, active, places: Places::default(), errors: Vec::new() }, done)
     }
 
-    /// Looks at the pixels beside each that goes on, after a round of these samples: of those near uneven ones that were done,
-    /// others go on, too, and those that are certain by what is beside them are done.
+    /// Compares the pixels that go on with their neighbours, after a round of these samples: finished pixels near uneven ones are
+    /// reopened, and those that their neighbours confirm are done.
     fn judge_neighbors<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
@@ -191,22 +189,22 @@ impl<'a> Sampler<'a> {
             around.see(judge, pixels, &news);
             active.extend(&news);
         }
-        // What lies beyond the outermost pixels is unknown.
+        // Neighbours of the outermost pixels are unknown.
         let known = self.grown(*tile, reach.saturating_sub(round + 1));
         active.retain(|&i| known.contains(pixels[i].at));
         around.judge(judge, pixels, active);
         Some(())
     }
 
-    /// Finds out how certain the pixels that go on are, with so many samples; those beside them that seemed so with fewer,
-    /// and are not by what is known now, get as many.
+    /// Estimates the errors of the active pixels, with so many samples; neighbours that seemed certain with fewer, and no longer
+    /// are, get as many.
     fn look<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, course: &mut Course, samples: u32) -> Option<()> {
         let Course { tile, around, pixels, active, places, errors } = course;
         around.look(&self.judge, pixels, active, errors);
         let mut news = active.clone();
         while !news.is_empty() {
             news = around.late(&self.judge, pixels, (&news, samples), *tile);
-            // Those with as many samples are active still.
+            // Those that already have as many samples are still active.
             active.extend(news.iter().filter(|&&i| pixels[i].facts.count < samples));
             self.catch_up(tracer, places, (pixels, &news), samples)?;
             around.look(&self.judge, pixels, &news, errors);
@@ -214,7 +212,7 @@ impl<'a> Sampler<'a> {
         Some(())
     }
 
-    /// A tile with nothing in its pixels.
+    /// A tile with empty pixels.
     fn nothing(&self, tile: Tile) -> TilePixels {
         let frame = self.frame;
         let (pixels, layers) = (tile.pixels(), if frame.settings.layers { tile.pixels() } else { 0 });
@@ -227,7 +225,7 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// Takes the first sample of every pixel, and of those around the tile that are `known`; opens those that need more.
+    /// Takes the first sample of every pixel, and of those around the tile that are `known`; opens the pixels that need more.
     fn take_first(
         &self,
         first: &[&First],
@@ -244,7 +242,7 @@ impl<'a> Sampler<'a> {
             };
             first.iter().for_each(|first| first.each_by_chance(known, &mut doubt));
         }
-        // Block by block, as rays of pixels near each other run alike.
+        // Block by block, as rays of nearby pixels are coherent.
         for block in known.blocks() {
             for y in block.y0..block.y1 {
                 let start = around.at((block.x0, y));
@@ -277,14 +275,14 @@ impl<'a> Sampler<'a> {
         done.rays = tile.pixels() as u64;
     }
 
-    /// A pixel with its first sample.
+    /// Opens a pixel with its first sample.
     fn opened(&self, first: &[&First], at: (u32, u32)) -> Pixel {
         let mut pixel = self.pixel(at);
         first.iter().for_each(|first| first.give(&mut pixel, self.fireflies));
         pixel
     }
 
-    /// Puts pixels in their places; the first `counted` samples of each are counted already.
+    /// Stores pixels in the tile; the first `counted` samples of each are counted already.
     fn put(&self, pixels: &[Pixel], counted: u32, done: &mut TilePixels) {
         let (frame, tile) = (self.frame, done.tile);
         for pixel in pixels {
@@ -292,7 +290,7 @@ impl<'a> Sampler<'a> {
                 let count = pixel.facts.count;
                 let first = counted.max(self.known(0..count));
                 let around = u64::from(count - first);
-                // Among other tiles these are there already.
+                // Other tiles hold the samples that are kept ahead.
                 let beyond = if self.ahead.is_some() { 0 } else { u64::from(first - counted) };
                 done.rays_around += around;
                 done.rays_beyond += beyond;
@@ -316,7 +314,7 @@ impl<'a> Sampler<'a> {
         self.first_samples.clamp(samples.start, samples.end) - samples.start
     }
 
-    /// Traces what these pixels are missing of so many samples, round by round.
+    /// Traces the samples that these pixels lack, up to `samples`, round by round.
     fn catch_up<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
@@ -331,7 +329,7 @@ impl<'a> Sampler<'a> {
         Some(())
     }
 
-    /// Gives active pixels those of these samples that were traced before the picture; the others are left.
+    /// Gives active pixels those of these samples that were traced before the picture; returns the rest.
     fn give_known(
         &self,
         (pixels, active): (&mut [Pixel], &[usize]),
@@ -388,19 +386,18 @@ impl<'a> Sampler<'a> {
     }
 }
 
-/// Samples of a pixel after each round: the fewest, no fewer than `known`, but then at least [`SURE`], then twice as many from
-/// round to round, powers of two throughout, as these many points of the sequence lie most evenly.
+/// Number of samples of a pixel after each round: the minimum, no fewer than `known`, then at least [`SURE`], then doubled every
+/// round: powers of two throughout, as runs of such length are most evenly distributed.
 fn rounds(how: &Stochastic, settings: &Settings, known: u32) -> impl Iterator<Item = u32> + use<> {
     let (fewest, most) = how.powers();
-    // In a single row or column there are not enough pixels beside one.
+    // In a single row or column a pixel has too few neighbours.
     let least = if settings.width.min(settings.height) < 2 { SURE } else { 1 };
     std::iter::successors(Some(fewest.max(least).max(known).min(most)), move |&last| {
         (last < most).then(|| (2 * last).max(SURE).min(most))
     })
 }
 
-/// After how many rounds the pixels beside each are looked at: after the first, and after that in which it gets [`SURE`]
-/// samples.
+/// Number of rounds after which neighbours are compared: the first, and then the one in which a pixel gets [`SURE`] samples.
 fn looks(rounds: &[u32]) -> usize {
     if rounds[0] < SURE { 2 } else { 1 }
 }

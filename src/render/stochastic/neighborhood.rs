@@ -1,9 +1,9 @@
-//! What the pixels beside a pixel tell about it.
+//! Comparison of a pixel with its neighbours.
 //!
-//! Most of a picture is so even that few samples of a pixel do. That these are enough is told by those of the eight pixels
-//! beside it: all must agree. What is thinner than a pixel, a wire or the stroke of a letter, shows in some of the pixels that
-//! it crosses and not in others; so wherever a pixel that was looked at closer turns out to be uneven, all near it are
-//! looked at as closely, and those near them if they are uneven, too ([`Neighborhood::reopen`]).
+//! Most of a picture is so even that a pixel needs few samples. Whether these suffice is judged by those of its eight neighbours:
+//! all must agree. A detail thinner than a pixel, a wire or the stroke of a letter, shows in some of the pixels that it crosses
+//! and not in others; so wherever a pixel that got more samples turns out to be uneven, all pixels near it get as many, and those
+//! near them if they are uneven, too ([`Neighborhood::reopen`]).
 
 use super::first::First;
 use super::pixel::Pixel;
@@ -11,29 +11,29 @@ use super::variances::Variances;
 use crate::render::certainty::{Certainty, Even, GROUPS, Range, Seen, Shown};
 use crate::render::tile::{End, PixelFacts, Tile};
 
-/// How many columns and rows from a pixel others are looked at as closely: from one on an edge, and from one with something
-/// thin, of which the next pixels may well show nothing.
+/// Distance in columns and rows within which pixels are reopened: around a pixel on an edge, and around one with a thin detail,
+/// which the next pixels may well miss.
 const REACH: [u32; 2] = [1, 4];
 
-/// The number of no pixel.
+/// Index that marks "no pixel".
 const NONE: u32 = u32::MAX;
 
 /// What the samples of a tile and of the pixels around it show.
 pub(super) struct Neighborhood {
     /// All of these pixels.
     pub tile: Tile,
-    /// What single samples show, row by row, with a place on every side where there is nothing.
+    /// What single samples show, row by row, with an empty place on every side.
     pub shown: Shown,
-    /// Numbers of pixels that have more of them, or none yet, likewise.
+    /// Indices of the pixels that have more samples, or none yet, at the same places.
     numbers: Vec<u32>,
-    /// What those pixels show, by number.
+    /// What those pixels show, by index.
     seen: Vec<Seen>,
-    /// How much samples vary, place by place; a single one that looks as all beside it does not.
+    /// Variance of the samples, by place; 0 for a single sample that looks like all its neighbours.
     variances: Variances,
 }
 
 impl Neighborhood {
-    /// What these first samples show of the pixels of a tile.
+    /// Collects what these first samples show of the pixels of a tile.
     pub(super) fn new(tile: Tile, first: &[&First]) -> Self {
         let columns = (tile.x1 - tile.x0 + 2) as usize;
         let places = columns * (tile.y1 - tile.y0 + 2) as usize;
@@ -44,24 +44,24 @@ impl Neighborhood {
         around
     }
 
-    /// Places in a row.
+    /// Number of places in a row.
     pub(super) fn columns(&self) -> usize {
         (self.tile.x1 - self.tile.x0 + 2) as usize
     }
 
-    /// The place of a pixel.
+    /// Place of a pixel.
     pub(super) fn at(&self, (x, y): (u32, u32)) -> usize {
         (y - self.tile.y0 + 1) as usize * self.columns() + (x - self.tile.x0 + 1) as usize
     }
 
-    /// Which of these pixels that have one sample are done, and how certain they are then: those that look as all beside them.
+    /// Which of the tile's pixels with one sample look like all their neighbours, and are done; with their errors.
     pub(super) fn even(&self, judge: &Certainty, tile: Tile) -> Even {
-        // With what lies between the rows, which is quicker than row by row.
+        // The places between the rows are included, which is faster than row by row.
         let (first, last) = (self.at((tile.x0, tile.y0)), self.at((tile.x1 - 1, tile.y1 - 1)));
         judge.compare(&self.shown, self.columns(), first..last + 1)
     }
 
-    /// Knows a pixel by its number, all smaller ones of which are known.
+    /// Registers a pixel under an index; all smaller indices are taken.
     pub(super) fn know(&mut self, pixel: (u32, u32), number: usize) {
         let at = self.at(pixel);
         self.numbers[at] = u32::try_from(number).unwrap_or(NONE);
@@ -69,19 +69,19 @@ impl Neighborhood {
         self.variances.learn(at, 0.0);
     }
 
-    /// What is seen at a place and beside it.
+    /// What is seen at a place and its neighbours.
     fn near(&self, at: usize) -> impl Iterator<Item = Seen> + Clone {
         let rows = [at - self.columns(), at, at + self.columns()];
         let places = rows.into_iter().flat_map(|middle| middle - 1..middle + 2);
         places.map(|at| self.seen.get(self.numbers[at] as usize).copied().unwrap_or_else(|| self.shown.at(at)))
     }
 
-    /// What the samples at a pixel and beside it lie between.
+    /// Range of the samples of a pixel and its neighbours.
     pub(super) fn range(&self, pixel: (u32, u32)) -> Range {
         self.near(self.at(pixel)).fold(Range::NOTHING, |all, seen| all.with(seen.range))
     }
 
-    /// Looks at the samples of these pixels, of which each has as many, up to as many as there are groups.
+    /// Evaluates the samples of these pixels: the same number for each, up to one in every group.
     pub(super) fn see(&mut self, judge: &Certainty, pixels: &[Pixel], some: &[usize]) {
         let mut each = some.iter();
         judge.see_each(some.iter().map(|&i| pixels[i].taken()), |seen| {
@@ -92,11 +92,10 @@ impl Neighborhood {
         }
     }
 
-    /// Finds out how certain the means of these pixels are, which have samples in each group.
+    /// Estimates the errors of the means of these pixels, which have samples in each group.
     ///
-    /// The few samples that see a light, or what glass shows of it, make both the mean of a pixel and what tells its error:
-    /// where hardly any did, it looks dark and certain. So its samples are taken to vary no less than those of the pixels
-    /// beside it.
+    /// The few samples that hit a light, or see it through glass, make up both a pixel's mean and its error estimate: a pixel in
+    /// which hardly any did looks dark and certain. So its samples are taken to vary no less than those of its neighbours.
     pub(super) fn look(&mut self, judge: &Certainty, pixels: &mut [Pixel], some: &[usize], errors: &mut Vec<f32>) {
         errors.clear();
         judge.each_standard_error(some.iter().map(|&i| &pixels[i].groups[..]), |error| errors.push(error));
@@ -106,7 +105,7 @@ impl Neighborhood {
         }
         for &i in some {
             let pixel = &mut pixels[i];
-            // What is not certain by itself is not with those beside it, either.
+            // A pixel that is not certain by itself is not certain with its neighbours, either.
             if pixel.used(judge) <= 1.0 {
                 self.compare(pixel);
                 pixel.look(judge);
@@ -114,15 +113,15 @@ impl Neighborhood {
         }
     }
 
-    /// Takes a pixel's samples to vary no less than those of the pixels beside it.
+    /// Raises the variance of a pixel's samples to that of its neighbours.
     pub(super) fn compare(&self, pixel: &mut Pixel) {
         if let Some(own) = pixel.variance() {
             pixel.take_to_vary(self.variances.no_less_than(own, self.at(pixel.at)));
         }
     }
 
-    /// The pixels of `tile` beside some that seemed certain with so many samples or fewer, and are not, now that more is known
-    /// of these.
+    /// Neighbours in `tile` of these pixels that seemed certain with `samples` or fewer, and are not with the variances known
+    /// now.
     pub(super) fn late(
         &self,
         judge: &Certainty,
@@ -152,8 +151,8 @@ impl Neighborhood {
         late
     }
 
-    /// Opens the pixels of `tile` that were done with so many samples and lie near uneven ones of these: those of one, which
-    /// have no numbers yet, and those of more, which have; their numbers.
+    /// Opens the pixels of `tile` that were done with `samples` and lie near uneven ones among `some`: those with one sample,
+    /// which get an index now, and those with more, which have one; returns their indices.
     pub(super) fn reopen(
         &mut self,
         judge: &Certainty,
@@ -189,8 +188,8 @@ impl Neighborhood {
         opened
     }
 
-    /// Finds the pixels of these that are done: their samples and those of the pixels beside them agree each among
-    /// themselves, and both are of the same colours. Of the others it finds the contrast around them.
+    /// Finishes those of these pixels whose own and neighbouring samples agree among themselves, and have the same colours. For
+    /// the others, stores the contrast around them.
     pub(super) fn judge(&self, judge: &Certainty, pixels: &mut [Pixel], some: &[usize]) {
         for &i in some {
             let (own, pixel) = (&self.seen[i], &mut pixels[i]);
@@ -219,7 +218,7 @@ mod tests {
         Certainty::new(None, (None, false), false, 0.05, factor(0.95))
     }
 
-    /// The pixels of a tile, each with so many samples, every other one of them this much lighter.
+    /// Pixels of a tile, each with `samples`, every second of which is lighter by `step`.
     fn pixels(tile: Tile, samples: usize, step: impl Fn((u32, u32)) -> f32) -> (Neighborhood, Vec<Pixel>) {
         let (mut around, mut pixels) = (Neighborhood::new(tile, &[]), Vec::new());
         for at in tile.places() {
@@ -237,12 +236,12 @@ mod tests {
         around.look(&judge(), pixels, some, &mut Vec::new());
     }
 
-    /// The standard error of eight samples, four each of 0 and `step`.
+    /// Standard error of eight samples, four each of 0 and `step`.
     fn error(step: f32) -> f32 {
         (step * step / 4.0 / 7.0).sqrt()
     }
 
-    /// What a pixel is told its error is, when all have been looked at.
+    /// Error of a pixel after all have been evaluated and compared.
     fn told((around, pixels): &mut (Neighborhood, Vec<Pixel>), pixel: usize) -> f32 {
         let all: Vec<usize> = (0..pixels.len()).collect();
         look(around, pixels, &all);
@@ -265,7 +264,7 @@ mod tests {
         let light = |(x, y): (u32, u32)| if x == 4 || y == 7 && x < 7 { 0.0 } else { 0.5 };
         let mut nine = pixels(TILE, GROUPS, |at| if at == (5, 8) { 0.0 } else { light(at) });
         assert_eq!(told(&mut nine, 4), 0.0);
-        // In a corner of a picture there are three beside it.
+        // In a corner of a picture a pixel has three neighbours.
         let mut nine = pixels(TILE, GROUPS, |at| if at == (6, 9) { 0.0 } else { light(at) });
         assert!((told(&mut nine, 8) - error(0.5)).abs() < 1e-6);
     }

@@ -8,26 +8,26 @@ use crate::render::layers::{FirstSurface, LayerSum};
 use crate::render::tile::{End, PixelFacts};
 use crate::render::whitted::Sample;
 
-/// A pixel on its way.
+/// A pixel in progress.
 pub(super) struct Pixel {
     /// Column and row.
     pub at: (u32, u32),
-    /// For all of its numbers.
+    /// Key of its random sequence.
     key: u32,
-    /// Samples in the order of the sequence, the same number in each.
+    /// Sums of samples in the order of the sequence, the same number in each group.
     pub groups: [Sum; GROUPS],
-    /// If they are wanted.
+    /// Sums of the layers, if these are wanted.
     pub layers: Option<Box<LayerSum>>,
     pub facts: PixelFacts,
-    /// Of one of its samples, as its groups tell it once each has one.
+    /// Variance of one sample, estimated from the groups once each has one.
     variance: Option<f32>,
-    /// Between its first samples and those of the pixels beside it.
+    /// Contrast between its first samples and those of its neighbours.
     contrast: f32,
-    /// The brightest light among these.
+    /// Brightest light among these samples.
     brightest: f32,
-    /// How bright the fireflies are that it may meet; 0: none.
+    /// Brightness of the fireflies that its rays may hit; 0: none.
     pub firefly: f32,
-    /// How much too dark it is by others that it may meet.
+    /// Amount by which the pixel is too dark for lack of further fireflies.
     pub missed: f32,
 }
 
@@ -47,7 +47,7 @@ impl Pixel {
         }
     }
 
-    /// Takes its first samples, or those that come next, of which so many go into each group.
+    /// Adds its next samples, `in_group` of which go into each group.
     pub(super) fn take(&mut self, samples: &[Sample], firsts: &[FirstSurface], in_group: usize) {
         let start = self.facts.count as usize;
         for (i, sample) in (start..).zip(samples) {
@@ -61,35 +61,35 @@ impl Pixel {
         }
     }
 
-    /// Expects fireflies that were met near it, if rays of some of these samples were spread by chance.
+    /// Prepares for fireflies that were found near the pixel, if rays of some of these samples were spread at random.
     pub(super) fn expect(&mut self, fireflies: Option<&Fireflies>, by_chance: &[bool]) {
         if let Some(fireflies) = fireflies.filter(|_| by_chance.contains(&true)) {
             (self.firefly, self.missed) = (fireflies.at(self.at), fireflies.missed_at(self.at));
         }
     }
 
-    /// It is certain enough, with this standard error.
+    /// Marks the pixel as certain enough, with this standard error.
     pub(super) fn done(&mut self, error: f32) {
         (self.facts.error, self.facts.end) = (error, End::Met);
     }
 
-    /// Whether so many samples were enough.
+    /// Whether the pixel was done with exactly this number of samples.
     pub(super) fn is_done_with(&self, samples: u32) -> bool {
         self.facts.end == End::Met && self.facts.count == samples
     }
 
-    /// Remembers what its first samples and those of the pixels beside it lie between, and what it may meet by chance.
+    /// Stores the range of its first samples and its neighbours', including fireflies that it may hit.
     pub(super) fn surround(&mut self, judge: &Certainty, range: &Range) {
         let range = if self.firefly > 0.0 { range.with(judge.range_of(self.firefly)) } else { *range };
         (self.contrast, self.brightest) = (judge.contrast(&range), range.brightest);
     }
 
-    /// The `index`th of its samples.
+    /// The sample of this index.
     pub(super) fn wanted(&self, index: u32) -> Wanted {
         Wanted { pixel: self.at, key: self.key, index }
     }
 
-    /// Makes groups that hold as many samples as those that come next will.
+    /// Merges groups in pairs, so that each holds as many samples as the next ones will.
     pub(super) fn join_groups(&mut self) {
         let joined = |k: usize| match self.groups.get(2 * k..2 * k + 2) {
             Some([a, b]) => a.plus(*b, 1.0),
@@ -102,35 +102,35 @@ impl Pixel {
         self.groups.iter().fold(Sum::default(), |sum, group| sum.plus(*group, 1.0))
     }
 
-    /// The groups that have samples.
+    /// Groups that have samples.
     pub(super) fn taken(&self) -> &[Sum] {
         &self.groups[..GROUPS.min(self.facts.count as usize)]
     }
 
-    /// Learns the standard error of its mean from its own samples; the variance of one of these.
+    /// Stores the standard error estimated from its own samples; returns the variance of one of these.
     pub(super) fn learn(&mut self, error: f32) -> f32 {
         let variance = self.variance_of(error);
         self.take_to_vary(variance);
         *self.variance.insert(variance)
     }
 
-    /// The variance of one of its samples whose mean has this standard error.
+    /// Variance of one sample, given the standard error of the mean.
     pub(super) fn variance_of(&self, error: f32) -> f32 {
-        // Of light without end it is no number.
+        // For infinite light it would be NaN.
         (error * error * self.samples()).max(0.0)
     }
 
-    /// The variance of one of its samples; `None` as long as there are too few.
+    /// Variance of one sample; `None` as long as there are too few.
     pub(super) fn variance(&self) -> Option<f32> {
         self.variance
     }
 
-    /// Takes its samples to vary so much.
+    /// Sets the error to that of samples with this variance.
     pub(super) fn take_to_vary(&mut self, variance: f32) {
         self.facts.error = (variance / self.samples()).sqrt();
     }
 
-    /// Finds out how certain the mean is, whose standard error is known.
+    /// Marks the pixel as done if its standard error is small enough.
     pub(super) fn look(&mut self, judge: &Certainty) {
         let used = self.used(judge);
         if used <= 1.0 {
@@ -139,7 +139,7 @@ impl Pixel {
         }
     }
 
-    /// The part of the error that is allowed which it uses.
+    /// Fraction of the allowed error that the pixel uses.
     pub(super) fn used(&self, judge: &Certainty) -> f32 {
         let contrast = self.contrast * judge.beyond_white(&self.groups, self.brightest);
         judge.used(self.facts.error, contrast, self.facts.count)

@@ -1,4 +1,4 @@
-//! Where samples lie in their pixels, and the rays through these places.
+//! Positions of samples in their pixels, and the rays through them.
 
 use crate::accel::Accel;
 use crate::math::simd::{Kernel, Level, Simd};
@@ -11,29 +11,29 @@ use crate::render::sampling::{Filter, Stochastic};
 use crate::render::sobol;
 use crate::render::whitted::Tracer;
 
-/// A sample of a pixel.
+/// One sample of a pixel.
 #[derive(Clone, Copy)]
 pub(in crate::render) struct Wanted {
     /// Column and row.
     pub pixel: (u32, u32),
-    /// For all numbers of the pixel.
+    /// Key of the pixel's random sequence.
     pub key: u32,
-    /// Its place in the pixel's sequence.
+    /// Index in the pixel's sequence.
     pub index: u32,
 }
 
-/// Samples that are traced together, one number of each in every column.
+/// Samples that are traced together, as columns.
 #[derive(Default)]
 pub(in crate::render) struct Places {
     keys: Vec<u32>,
     indices: Vec<u32>,
-    /// From the upper left corner of the picture: of the pixel, then of the sample.
+    /// Position from the upper left corner of the picture: of the pixel, then of the sample.
     x: Vec<f64>,
     y: Vec<f64>,
 }
 
 impl Places {
-    /// Traces these samples all together; `None` when cancelled.
+    /// Traces all these samples together; `None` when cancelled.
     pub(in crate::render) fn trace<A: Accel, P: Observer>(
         &mut self,
         frame: &Frame,
@@ -43,7 +43,7 @@ impl Places {
     ) -> Option<()> {
         self.clear();
         let Self { keys, indices, x, y } = self;
-        // Nested iterators are quick from inside, and slow one after another.
+        // Nested iterators are fast with internal iteration, and slow with `next`.
         wanted.for_each(|Wanted { pixel, key, index }| {
             keys.push(key);
             indices.push(index);
@@ -53,7 +53,7 @@ impl Places {
         self.send(frame, how, roulette, tracer)
     }
 
-    /// Traces the sample of this index of each of the pixels in these columns and rows.
+    /// Traces the sample of this index of each pixel in these columns and rows.
     pub(in crate::render) fn trace_each<A: Accel, P: Observer>(
         &mut self,
         frame: &Frame,
@@ -104,14 +104,14 @@ impl Places {
     }
 }
 
-/// Where a sample of the pixel with this corner goes through the picture and the lens. Its first two numbers are those without a
-/// lens.
+/// Position of a sample in the picture and on the lens, for the pixel with this corner. The first two coordinates are the same
+/// without a lens.
 fn through(how: &Stochastic, Stream { key, index }: Stream, [x, y]: [f64; 2]) -> CameraSample {
     let [across, down, u, v] = sobol::point(index, key);
     CameraSample { x: x + how.filter.place(across), y: y + how.filter.place(down), lens: [u, v] }
 }
 
-/// Moves samples from the corners of their pixels to their places.
+/// Kernel that moves samples from the corners of their pixels to their positions.
 struct Draw<'a> {
     filter: Filter,
     keys: &'a [u32],
@@ -125,7 +125,7 @@ impl Kernel for Draw<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        // What all share is decided outside the loop, which then is a formula.
+        // The filter is matched outside the loop, which is then branch-free.
         match self.filter {
             Filter::Box => self.each(|u| u),
             Filter::Tent => self.each(|u| Filter::Tent.place(u)),

@@ -1,10 +1,10 @@
-//! All tiles of a picture, which share the first samples of their pixels.
+//! Renders all tiles of a picture, which share the first samples of their pixels.
 //!
-//! A tile needs these of some pixels around it, too. They are traced by zones, since of tiles beside it a tile needs no more
-//! than their borders: each zone belongs to the first tile that needs it, so that each is traced once, and all samples of a tile
-//! soon after each other, while what they meet is near in memory. All zones of a tile go together, whoever traces them: what a
-//! sample gathers may depend on those that are traced with it, where more rays wait than go into a wave. They are kept until
-//! all tiles that need any of them are finished.
+//! A tile needs the first samples of some pixels around it, too. These are traced by zones, since of its neighbours a tile needs
+//! no more than their borders: each zone belongs to the first tile that needs it, so that each is traced once, and all samples of
+//! a tile soon after each other, while the geometry they hit is in the cache. All zones of a tile are traced together, whoever
+//! does it: the sum of a sample may depend on those traced with it, where more rays wait than fit into a wave. The samples are
+//! kept until all tiles that need any of them are finished.
 
 use super::first::First;
 use super::{Sampler, Stochastic};
@@ -19,8 +19,8 @@ use crate::render::tile::{Tile, TilePixels, TracedTiles, each_tile};
 use crate::render::whitted::Tracer;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Renders all tiles, given row by row, and has each kept that is finished; the counts of all threads, and whether nothing was
-/// cut short.
+/// Renders all tiles, given row by row, and passes each finished one to `keep`; returns the counts of all threads, and whether
+/// the picture is complete.
 pub(in crate::render) fn render_all<A: Accel, P: Observer>(
     frame: &Frame,
     how: &Stochastic,
@@ -44,36 +44,36 @@ pub(in crate::render) fn render_all<A: Accel, P: Observer>(
 /// First samples that some tile still needs.
 struct Shared<'t> {
     tiles: &'t [Tile],
-    /// The zones that belong to each tile.
+    /// Zones that belong to each tile.
     zones: Vec<Vec<Tile>>,
-    /// The tiles, by number, of whose zones each tile needs some.
+    /// For each tile, the indices of the tiles that own a zone it needs.
     needs: Vec<Vec<usize>>,
     states: Mutex<Vec<State>>,
-    /// Some samples are there, or will never be.
+    /// Signalled when samples are done or have failed.
     changed: Condvar,
 }
 
-/// What is known of the first samples of all zones that belong to a tile.
+/// State of the first samples of all zones that belong to a tile.
 struct State {
     step: Step,
     first: Option<Arc<First>>,
-    /// How many tiles still need them.
+    /// Number of tiles that still need them.
     needing: usize,
 }
 
-/// How far they are.
+/// Progress of the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
-    /// They were not needed yet.
+    /// Not needed yet.
     Untouched,
-    /// A thread traces them.
+    /// A thread is tracing them.
     Promised,
-    /// They were traced, or that failed.
+    /// Traced, or failed.
     Done,
 }
 
 impl<'t> Shared<'t> {
-    /// Of tiles row by row, each of which needs what it becomes when it is `grown`.
+    /// Assigns the zones of tiles, given row by row; each tile needs the area that `grown` returns.
     fn new(tiles: &'t [Tile], grown: impl Fn(Tile) -> Tile) -> Self {
         let columns = tiles.iter().take_while(|tile| tile.y0 == tiles[0].y0).count().max(1);
         let grown: Vec<Tile> = tiles.iter().map(|&tile| grown(tile)).collect();
@@ -100,14 +100,14 @@ impl<'t> Shared<'t> {
         Self { tiles, zones, needs, states: Mutex::new(states), changed: Condvar::new() }
     }
 
-    /// Renders a tile by number; `None` when cancelled.
+    /// Renders a tile by index; `None` when cancelled.
     fn finish<A: Accel, P: Observer>(
         &self,
         sampler: &Sampler,
         tracer: &mut Tracer<A, P>,
         tile: usize,
     ) -> Option<TilePixels> {
-        // Others have mostly traced what belongs to tiles before this one.
+        // Other threads have mostly traced what belongs to tiles before this one.
         for &owner in &self.needs[tile] {
             if let Some(mut promise) = self.promise(owner) {
                 promise.first = Some(sampler.first(tracer, self.zones[owner].iter().copied())?);
@@ -121,11 +121,11 @@ impl<'t> Shared<'t> {
     }
 
     fn states(&self) -> MutexGuard<'_, Vec<State>> {
-        // Nothing that can fail is done while states change.
+        // No code that can panic runs while states change.
         self.states.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The zones of a tile, if no thread traces them yet: the caller will.
+    /// Claims the zones of a tile for the caller to trace; `None` if another thread has.
     fn promise(&self, owner: usize) -> Option<Promise<'_, 't>> {
         let step = &mut self.states()[owner].step;
         (*step == Step::Untouched).then(|| {
@@ -134,8 +134,8 @@ impl<'t> Shared<'t> {
         })
     }
 
-    /// The first samples that a tile needs, when all are there; `None` when some will never be. All must be promised, and
-    /// nobody waits who has promised any and not kept it.
+    /// Waits for the first samples that a tile needs; `None` when some failed. All must be promised, and no thread may wait while
+    /// it holds a promise.
     fn wait_for(&self, tile: usize) -> Option<Vec<Arc<First>>> {
         let (mut states, needs) = (self.states(), &self.needs[tile]);
         while needs.iter().any(|&owner| states[owner].step != Step::Done) {
@@ -144,7 +144,7 @@ impl<'t> Shared<'t> {
         needs.iter().map(|&owner| states[owner].first.clone()).collect()
     }
 
-    /// A tile is finished.
+    /// Releases the samples that a finished tile needed.
     fn forget(&self, tile: usize) {
         let mut states = self.states();
         for &owner in &self.needs[tile] {
@@ -157,8 +157,8 @@ impl<'t> Shared<'t> {
     }
 }
 
-/// A tile and those beside it, by number, of so many that lie row by row. What a tile needs reaches no farther: only the last
-/// ones of a row or a column are small.
+/// Indices of a tile and its neighbours in a grid of `columns`. The area a tile needs reaches no farther: only the last tiles of
+/// a row or column are small.
 fn beside(tile: usize, columns: usize, tiles: usize) -> impl Iterator<Item = usize> {
     let (row, column) = (tile / columns, tile % columns);
     let near = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
@@ -166,11 +166,11 @@ fn beside(tile: usize, columns: usize, tiles: usize) -> impl Iterator<Item = usi
         .flat_map(move |row| near(column, columns).map(move |column| row * columns + column))
 }
 
-/// Hands over first samples in the end, however that comes.
+/// Delivers first samples when dropped, even after a failure.
 struct Promise<'a, 't> {
     shared: &'a Shared<'t>,
     owner: usize,
-    /// Of all zones, or none.
+    /// Samples of all zones; `None` after a failure.
     first: Option<First>,
 }
 
@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn whoever_waits_for_a_promise_that_is_not_kept_hears_of_it() {
-        // They live on with a thread that hears of nothing.
+        // Leaked, as they outlive the test with the waiting thread.
         let tiles: &'static [Tile] = tiles(70, 40).leak();
         let shared: &'static Shared = Box::leak(Box::new(Shared::new(tiles, |tile| tile.grown(70, 40))));
         let promises: Vec<_> = shared.needs[4].iter().filter_map(|&owner| shared.promise(owner)).collect();
@@ -238,8 +238,8 @@ mod tests {
         assert_eq!(heard.recv_timeout(Duration::from_secs(60)), Ok(true));
     }
 
-    /// A ball of glass that bends every colour its own way, over all of the picture: each eye ray becomes so many that they do
-    /// not fit one wave, and where they are cut decides about the last bits of sums.
+    /// A glass ball with dispersion that fills the picture: each eye ray splits into more rays than fit one wave, and where waves
+    /// are cut decides about the last bits of sums.
     fn prism() -> Scene {
         let glass = MetalRough {
             transmission: 1.0,

@@ -1,30 +1,30 @@
-//! How much the samples of pixels vary, place by place.
+//! Variance of the samples of pixels, by place.
 
-/// The variance of one sample of each pixel; NaN where nothing is known of it.
+/// Variance of one sample of each pixel; NaN where it is unknown.
 pub(super) struct Variances {
     columns: usize,
     each: Vec<f32>,
 }
 
 impl Variances {
-    /// Of places so many in a row, nothing yet.
+    /// Empty, for rows of this many places.
     pub(super) fn nothing(columns: usize) -> Self {
         Self { columns, each: Vec::new() }
     }
 
-    /// Begins with those of single samples, which do not vary; of each place a number, which is not one where there is none.
+    /// Starts with single samples, whose variance is 0; `samples` has a number for each place, NaN where there is none.
     pub(super) fn begin(&mut self, samples: &[f32]) {
         self.each.clear();
         self.each.extend(samples.iter().map(|sample| if sample.is_nan() { f32::NAN } else { 0.0 }));
     }
 
-    /// Learns that of a place.
+    /// Sets the variance of a place.
     pub(super) fn learn(&mut self, at: usize, variance: f32) {
         self.each[at] = variance;
     }
 
-    /// `own`, or that of the pixels beside a place if it is more: the fifth of eight in their order, the middle of three and
-    /// of five.
+    /// The larger of `own` and the variance of the neighbours of a place: the fifth of eight in ascending order, the middle of
+    /// three and of five.
     pub(super) fn no_less_than(&self, own: f32, at: usize) -> f32 {
         let row = |middle: usize| [self.each[middle - 1], self.each[middle], self.each[middle + 1]];
         let [a, b, c] = row(at - self.columns);
@@ -32,7 +32,7 @@ impl Variances {
         let [f, g, h] = row(at + self.columns);
         let beside = [a, b, c, d, e, f, g, h];
         let known = beside.iter().filter(|variance| !variance.is_nan()).count();
-        // How many are no less than the one that counts, it among them.
+        // Number of neighbours that are no less than the chosen one, including it.
         let upper = known - known.saturating_sub(1) * 4 / 7;
         let more = beside.iter().filter(|&&variance| variance > own).count();
         if more < upper || known == 0 {
@@ -42,10 +42,9 @@ impl Variances {
     }
 }
 
-/// Eight numbers in order, the largest first, without a choice on the way (K. E. Batcher, "Sorting Networks and Their
-/// Applications", 1968).
+/// Sorts eight numbers in descending order without branches (K. E. Batcher, "Sorting Networks and Their Applications", 1968).
 fn descending(mut numbers: [f32; 8]) -> [f32; 8] {
-    // Each with its places written down: in a loop over pairs the numbers would stay in memory.
+    // Unrolled by hand: in a loop over pairs the numbers would stay in memory.
     order::<0, 1>(&mut numbers);
     order::<2, 3>(&mut numbers);
     order::<4, 5>(&mut numbers);
@@ -68,7 +67,7 @@ fn descending(mut numbers: [f32; 8]) -> [f32; 8] {
     numbers
 }
 
-/// Puts the larger one of two numbers first.
+/// Moves the larger of two numbers to the first place.
 #[inline(always)]
 fn order<const I: usize, const J: usize>(numbers: &mut [f32; 8]) {
     let (a, b) = (numbers[I], numbers[J]);
@@ -79,7 +78,7 @@ fn order<const I: usize, const J: usize>(numbers: &mut [f32; 8]) {
 mod tests {
     use super::*;
 
-    /// Of the middle of nine places.
+    /// The result for the middle of nine places.
     fn no_less_than(own: f32, beside: [f32; 8]) -> f32 {
         let mut variances = Variances::nothing(3);
         variances.begin(&[f32::NAN; 9]);
@@ -107,7 +106,7 @@ mod tests {
         assert_eq!(no_less_than(2.0, [nan; 8]), 2.0);
     }
 
-    /// What puts all zeros and ones in order puts everything in order (D. E. Knuth, *The Art of Computer Programming*, 5.3.4).
+    /// A network that sorts all zeros and ones sorts everything (D. E. Knuth, *The Art of Computer Programming*, 5.3.4).
     #[test]
     fn all_zeros_and_ones_are_put_in_order() {
         for bits in 0..256_u32 {
