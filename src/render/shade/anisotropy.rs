@@ -1,8 +1,8 @@
-//! Surfaces with a grain, brushed metal above all: light is spread farther along the grain than across it
+//! Anisotropic surfaces, brushed metal above all: light is spread farther along the grain than across it
 //! (KHR_materials_anisotropy).
 //!
 //! B. Burley, "Physically Based Shading at Disney" (2012) for the distribution of facets, E. Heitz, "Understanding the
-//! Masking-Shadowing Function" (2014) for how they hide each other.
+//! Masking-Shadowing Function" (2014) for their masking.
 
 use super::highlight::{NARROWEST_HIGHLIGHT, least_square};
 use super::metal_rough::above;
@@ -16,25 +16,25 @@ use crate::render::studio;
 use crate::scene::{Anisotropy, UpAxis};
 use std::f32::consts::PI;
 
-/// Lookups of the surroundings along the grain.
+/// Number of environment lookups along the grain.
 const LOOKUPS: usize = 32;
 
-/// The grain at one point.
+/// Anisotropic lobe at one point.
 #[derive(Clone, Debug)]
 pub(crate) struct AnisotropicLobe {
-    /// Unit vectors along and across it, on the surface.
+    /// Unit vectors along and across the grain, on the surface.
     along: Vec3,
     across: Vec3,
-    /// Widths of the distribution of facets along and across.
+    /// Widths α of the facet distribution along and across.
     alpha: [f32; 2],
-    /// Squares of both where lights are seen in it, at least.
+    /// Lower bound of their squares in highlights of lights.
     least_square: f32,
 }
 
 impl AnisotropicLobe {
-    /// Of a surface with this roughness across the grain; `None` where it has none.
+    /// Lobe of a surface with this roughness across the grain; `None` where it has no grain.
     pub(super) fn new(anisotropy: &Anisotropy, roughness: f32, on: &LobeFrame, reader: &Reader) -> Option<Self> {
-        // A map's middle is no direction; without a map the grain runs along the tangent.
+        // The middle value of a map is no direction; without a map the grain runs along the tangent.
         let texel = match &anisotropy.map {
             Some(map) => reader.linear(Some(map)).truncate() * Vec3::new(2.0, 2.0, 1.0) - Vec3::new(1.0, 1.0, 0.0),
             None => Vec3::new(1.0, 0.0, 1.0),
@@ -56,12 +56,12 @@ impl AnisotropicLobe {
         Self { along, across, alpha: [narrow + (1.0 - narrow) * strength * strength, narrow], least_square: 0.0 }
     }
 
-    /// Perceptual roughness along it.
+    /// Perceptual roughness along the grain.
     pub(super) fn roughness(&self) -> f32 {
         self.alpha[0].sqrt()
     }
 
-    /// Its facets.
+    /// Facets of the lobe.
     pub(super) fn lobe(&self, normal: Vec3) -> Lobe {
         Lobe::new([self.along, self.across], normal, self.alpha)
     }
@@ -77,12 +77,12 @@ impl AnisotropicLobe {
         Self { alpha, ..self.clone() }.highlight(normal, view, to_light)
     }
 
-    /// Distribution × visibility of a light without extent, before Fresnel; all unit vectors, on the front.
+    /// Distribution × visibility for a light without extent, before Fresnel; all unit vectors, on the front.
     pub(super) fn highlight(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> f32 {
         self.lobe(normal).highlight(view, to_light)
     }
 
-    /// The surroundings as facets show them that lean along the grain, each as blurred as it is rough across.
+    /// Mean radiance of the environment mirrored by facets that lean along the grain, each blurred by the roughness across.
     pub(super) fn mirrored(&self, seen: &ShadingFrame, sky: &Sky) -> Vec3 {
         let level = Level::best();
         let mut leans = Leans::default();
@@ -104,23 +104,23 @@ impl AnisotropicLobe {
     }
 }
 
-/// A number of every lookup.
+/// One value of every lookup.
 type Row = [f32; LOOKUPS];
 
 /// Lookups by facets that lean along a grain.
 #[derive(Default)]
 struct Leans {
-    /// Where each mirrors the view to, by axis.
+    /// Mirrored directions, by axis.
     dirs: [Row; 3],
-    /// How rough a mirror would show so much as it.
+    /// Roughness of a mirror with the same blur.
     blur: Row,
-    /// What it counts; 0 for facets that are not seen.
+    /// Weight; 0 for facets that are not visible.
     share: Row,
-    /// The light there, in the studio.
+    /// Radiance in that direction, in the studio.
     studio: Row,
 }
 
-/// Finds the facets that stand for equal parts of a grain's distribution.
+/// Kernel that places facets for equal shares of a grain's distribution.
 struct Lean<'a> {
     anisotropy: &'a AnisotropicLobe,
     seen: &'a ShadingFrame,
@@ -130,7 +130,7 @@ struct Lean<'a> {
 impl Kernel for Lean<'_> {
     type Output = ();
 
-    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
+    // The lanes are plain arrays: the token `S` only tells which instructions the compiler may use.
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
         let Self { anisotropy, seen, to } = self;
@@ -154,7 +154,7 @@ impl Kernel for Lean<'_> {
     }
 }
 
-/// Looks all of them up in the studio.
+/// Kernel that looks all of them up in the studio.
 struct LookUp<'a> {
     leans: &'a mut Leans,
     up: UpAxis,
@@ -165,7 +165,7 @@ impl Kernel for LookUp<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        // The axis is asked outside the loop, which then is a formula.
+        // The axis is matched outside the loop, which is then branch-free.
         match self.up {
             UpAxis::Y => self.leans.look_up(UpAxis::Y),
             UpAxis::Z => self.leans.look_up(UpAxis::Z),

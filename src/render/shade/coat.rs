@@ -1,7 +1,7 @@
-//! Clear coat: a clear dielectric layer over whatever a surface is (KHR_materials_clearcoat).
+//! Clear coat: a clear dielectric layer over any surface (KHR_materials_clearcoat).
 //!
-//! What the layer reflects, by the same microfacet model as the surface under it, is taken off what comes from below; light
-//! is not bent on its way through. The share that is taken off is that of the view alone, as the extension says.
+//! The light that the layer reflects, by the same microfacet model as the surface under it, is subtracted from that below; light
+//! passes through without refraction. The subtracted share is that of the view direction alone, as the extension says.
 
 use super::facets::albedo;
 use super::highlight::{highlight, is_narrow, least_square, squared_width};
@@ -11,29 +11,29 @@ use crate::math::Vec3;
 use crate::render::optics::{fresnel_schlick, reflect};
 use crate::scene::Coat;
 
-/// Reflectance of a boundary to index 1.5, face on.
+/// Reflectance at normal incidence of a boundary to index 1.5.
 const F0: f32 = 0.04;
 
-/// The clear coat at one point.
+/// Clear coat at one point.
 #[derive(Clone, Debug)]
 pub(crate) struct CoatLobe {
     /// Share of the surface that it covers.
     pub strength: f32,
     pub roughness: f32,
-    /// Its own shading normal, on the viewer's side.
+    /// Shading normal of the coat, on the viewer's side.
     pub normal: Vec3,
-    /// Cosine of the view from it.
+    /// Cosine between the view and `normal`.
     pub n_v: f32,
-    /// Share of the light from below that it takes off.
+    /// Share of the light from below that it removes.
     pub taken: f32,
-    /// Share of the surroundings that is open to it.
+    /// Share of the environment that is unoccluded.
     pub occlusion: f32,
-    /// α² of its highlights at least.
+    /// Lower bound of α² in highlights.
     pub least_square: f32,
 }
 
 impl CoatLobe {
-    /// What covers nothing.
+    /// A coat that covers nothing.
     pub(crate) const NONE: Self = Self {
         strength: 0.0,
         roughness: 0.0,
@@ -44,7 +44,7 @@ impl CoatLobe {
         least_square: 0.0,
     };
 
-    /// `None` where it covers nothing; `normal` is that of the clear coat.
+    /// `None` where it covers nothing; `normal` is that of the coat.
     pub(super) fn new(coat: &Coat, normal: Vec3, view: Vec3, occlusion: f32, reader: &Reader) -> Option<Self> {
         let strength = (coat.strength * reader.linear(coat.strength_map.as_ref()).x).clamp(0.0, 1.0);
         let roughness = (coat.roughness * reader.linear(coat.roughness_map.as_ref()).y).clamp(0.0, 1.0);
@@ -53,7 +53,7 @@ impl CoatLobe {
         (strength > 0.0).then_some(Self { strength, roughness, normal, n_v, taken, occlusion, least_square: 0.0 })
     }
 
-    /// Share of what is below that is seen.
+    /// Share of the light from below that passes through.
     #[inline(always)]
     pub(crate) fn clear(&self) -> f32 {
         1.0 - self.taken
@@ -86,12 +86,12 @@ impl CoatLobe {
         self.strength * fresnel(0.5 * between.length()) * highlight(self.normal, between, [n_l, n_v], a2) * n_l
     }
 
-    /// BRDF × N·L of the part of it that [`Self::ambient`] looks up.
+    /// BRDF × N·L of the part that [`Self::ambient`] looks up.
     pub(super) fn lit_around(&self, view: Vec3, to: Vec3) -> f32 {
         self.shown(view, to, squared_width(self.roughness)) * (1.0 - traced(self.roughness))
     }
 
-    /// What it shows of the surroundings without a ray.
+    /// Light of the environment that it reflects without a ray.
     pub(super) fn ambient(&self, seen: &ShadingFrame, sky: &Sky, ambient: Vec3) -> Vec3 {
         if self.looked_up() <= 0.0 {
             return Vec3::ZERO;
@@ -100,32 +100,32 @@ impl CoatLobe {
         (sky.blurred(self.mirrored_from(seen), self.roughness) + ambient) * share
     }
 
-    /// Share of what it mirrors that is looked up.
+    /// Share of the mirrored light that is looked up.
     #[inline(always)]
     pub(crate) fn looked_up(&self) -> f32 {
         1.0 - traced(self.roughness)
     }
 
-    /// Where that is looked for.
+    /// Direction of that lookup.
     #[inline(always)]
     pub(crate) fn mirrored_from(&self, seen: &ShadingFrame) -> Vec3 {
         above(reflect(-seen.view, self.normal), seen.geometric)
     }
 
-    /// Share of the light there that is seen; `scale` and `bias` are the shares of f0 and f90 in what its lobe sends back.
+    /// Share of that light that is seen; `scale` and `bias` are the shares of f0 and f90 in the lobe's albedo.
     #[inline(always)]
     pub(crate) fn share_looked_up(&self, (scale, bias): (f32, f32)) -> f32 {
         let share = self.strength * (F0 * scale + bias) * open(self.n_v, self.occlusion, self.roughness);
         share * self.looked_up()
     }
 
-    /// Weight of the mirror ray off it.
+    /// Weight of the mirror ray off the coat.
     pub(super) fn mirrored(&self) -> f32 {
         self.taken * traced(self.roughness)
     }
 }
 
-/// Reflectance at this cosine.
+/// Fresnel reflectance at this cosine.
 #[inline(always)]
 fn fresnel(cosine: f32) -> f32 {
     fresnel_schlick(Vec3::splat(F0), 1.0, cosine).x

@@ -1,5 +1,5 @@
-//! How much even light from all around the microfacets of a rough surface send back: directly ([`albedo`]), and after
-//! several bounces between them ([`rebound`]).
+//! Share of uniform light that the microfacets of a rough surface reflect: directly ([`albedo`]), and after several bounces
+//! between them ([`rebound`]).
 
 use crate::math::Vec3;
 use crate::math::formula::{floor, integer};
@@ -115,7 +115,7 @@ pub(crate) fn albedo(roughness: f32, n_v: f32) -> (f32, f32) {
     between(n_v, |column| row.entry(column))
 }
 
-/// The place of a roughness among the rows of [`ALBEDO`].
+/// Position of a roughness among the rows of [`ALBEDO`].
 #[derive(Clone, Copy)]
 struct Row {
     row: usize,
@@ -142,7 +142,7 @@ impl Row {
 /// [`albedo`] of one roughness for many points.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AlbedoRow {
-    /// Both numbers at the columns of [`ALBEDO`] but for the last, and how much larger the next ones are.
+    /// Both values at all columns of [`ALBEDO`] but the last, and their differences to the next ones.
     from: [Eight; 2],
     rise: [Eight; 2],
 }
@@ -159,7 +159,7 @@ impl AlbedoRow {
         Self { from, rise }
     }
 
-    /// Both numbers at each of eight N·V.
+    /// Both values at each of eight N·V.
     #[inline(always)]
     pub(crate) fn at_each<S: Simd>(&self, s: S, n_v: &Eight) -> [Eight; 2] {
         let (mut columns, mut rests) = ([0; LANES], [0.0; LANES]);
@@ -174,8 +174,8 @@ impl AlbedoRow {
     }
 }
 
-/// Of each square between entries of [`ALBEDO`], row by row, those at its corners: left and right in the upper row, and in the
-/// lower one.
+/// For each cell between entries of [`ALBEDO`], row by row, the entries at its corners: left and right in the upper row, then in
+/// the lower one.
 const SQUARES: [[[f32; 4]; 2]; 64] = {
     let (mut squares, mut i) = ([[[0.0; 4]; 2]; 64], 0);
     while i < 128 {
@@ -207,19 +207,19 @@ pub(crate) fn albedo_of_each<S: Simd>(s: S, roughness: &Eight, n_v: &Eight) -> [
     found
 }
 
-/// The row of [`ALBEDO`] before this roughness, but for the last, and how far behind it that is.
+/// Row of [`ALBEDO`] before this roughness, never the last, and the distance behind it.
 #[inline(always)]
 fn row(roughness: f32) -> (u32, f32) {
     before(roughness.clamp(0.0, 1.0) * 8.0)
 }
 
-/// The column of [`ALBEDO`] before this N·V, but for the last, and how far behind it that is.
+/// Column of [`ALBEDO`] before this N·V, never the last, and the distance behind it.
 #[inline(always)]
 fn column(n_v: f32) -> (u32, f32) {
     before(n_v.clamp(0.0, 1.0).sqrt() * 8.0)
 }
 
-/// The whole number before `x`, 0 … 8, at most 7, and how far behind it that is.
+/// Whole part of `x`, 0 … 8, at most 7, and the rest.
 #[inline(always)]
 fn before(x: f32) -> (u32, f32) {
     let whole = floor(x);
@@ -227,7 +227,7 @@ fn before(x: f32) -> (u32, f32) {
     (integer(whole).cast_unsigned(), x - whole)
 }
 
-/// Between the two entries that are nearest to N·V.
+/// Interpolates between the two entries that are nearest to N·V.
 #[inline(always)]
 fn between(n_v: f32, entry: impl Fn(usize) -> (f32, f32)) -> (f32, f32) {
     let (column, rest) = column(n_v);
@@ -238,22 +238,22 @@ fn between(n_v: f32, entry: impl Fn(usize) -> (f32, f32)) -> (f32, f32) {
 /// of 2 E(μ) μ over [`ALBEDO`]'s rows.
 const MEAN_ALBEDO: [f32; 9] = [1.000, 0.999, 0.987, 0.951, 0.883, 0.781, 0.657, 0.529, 0.410];
 
-/// The mean over the hemisphere of what a white lobe of any roughness sends back.
+/// Mean over the hemisphere of the albedo of a white lobe of any roughness.
 #[inline(always)]
 pub(crate) fn mean_albedo(roughness: f32) -> f32 {
     let Row { row, rest } = Row::of(roughness);
     MEAN_ALBEDO[row] + (MEAN_ALBEDO[row + 1] - MEAN_ALBEDO[row]) * rest
 }
 
-/// The share of even light from all around that leaves a metal after more than one bounce between its facets, relative
-/// to what the first bounce loses.
+/// Share of uniform light that leaves a metal after more than one bounce between its facets, relative to the loss of the first
+/// bounce.
 ///
-/// The microfacet model follows light to one facet only and so loses what meets a second: two thirds on the roughest
-/// metal. This colours it once more by each bounce (C. Fdez-Agüera, "A Multiple-Scattering Microfacet Model for Real-Time
-/// Image-Based Lighting", 2019); `mean` is [`mean_albedo`], `f0` the metal's colour face on.
+/// The microfacet model follows light to one facet only and so loses light that hits a second: two thirds on the roughest metal.
+/// Here each further bounce is coloured once more (C. Fdez-Agüera, "A Multiple-Scattering Microfacet Model for Real-Time
+/// Image-Based Lighting", 2019); `mean` is [`mean_albedo`], `f0` the metal's colour at normal incidence.
 #[inline(always)]
 pub(super) fn rebound(mean: f32, f0: Vec3) -> Vec3 {
-    // The mean of Schlick's reflectance over the hemisphere.
+    // Mean of Schlick's reflectance over the hemisphere.
     let f0 = f0.min(Vec3::ONE);
     let once = f0 + (Vec3::ONE - f0) / 21.0;
     once * once * mean / (Vec3::ONE - once * (1.0 - mean))
@@ -316,7 +316,7 @@ mod tests {
                 }
             }
         }
-        // Each of another roughness.
+        // Each with another roughness.
         let roughness = [0.0, 0.125, 0.124, 0.5, 0.51, 0.875, 0.999, 1.0];
         for n_v in &eights {
             let alone = std::array::from_fn(|i| albedo(roughness[i], n_v[i]));

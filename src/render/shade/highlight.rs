@@ -7,26 +7,26 @@ use crate::math::Vec3;
 use crate::math::formula::smoothstep;
 use std::f32::consts::PI;
 
-/// Highlights of lights without extent are never narrower than this roughness makes them.
+/// Lower bound of the roughness in highlights of lights without extent.
 pub(super) const NARROWEST_HIGHLIGHT: f32 = 0.045;
-/// Below this roughness they are widened so that rays meet them (see [`crate::render::glint`]).
+/// Below this roughness they are widened so that rays hit them (see [`crate::render::glint`]).
 const NARROW_HIGHLIGHT: f32 = 0.35;
 
-/// α² of the highlights that a roughness gives: its fourth power.
+/// α² of the highlights of a roughness: its fourth power.
 #[inline(always)]
 pub(super) fn squared_width(roughness: f32) -> f32 {
     let alpha = roughness.max(NARROWEST_HIGHLIGHT) * roughness.max(NARROWEST_HIGHLIGHT);
     alpha * alpha
 }
 
-/// Whether a roughness makes highlights of lights that must be widened.
+/// Whether highlights of lights at this roughness must be widened.
 #[inline(always)]
 pub(crate) fn is_narrow(roughness: f32) -> bool {
     roughness < NARROW_HIGHLIGHT
 }
 
-/// What that is at least where it should be `to`: all of it where roughness makes it narrow, up to what is wide, and less and
-/// less where roughness makes it wide by itself.
+/// Lower bound of α² where `to` is wanted: all of it, up to a limit, where the roughness makes highlights narrow, fading to none
+/// where the roughness makes them wide by itself.
 #[inline(always)]
 pub(super) fn least_square(roughness: f32, to: f32) -> f32 {
     /// α² of a roughness of 0.7.
@@ -52,7 +52,7 @@ fn ggx(normal: Vec3, between: Vec3, a2: f32) -> f32 {
     a2 * narrow * narrow
 }
 
-/// What divides ½ in Smith's height-correlated masking and shadowing over 4 N·L N·V (E. Heitz, "Understanding the
+/// Smith's height-correlated masking and shadowing over 4 N·L N·V is ½ divided by this (E. Heitz, "Understanding the
 /// Masking-Shadowing Function", 2014).
 #[inline(always)]
 fn masking(n_l: f32, n_v: f32, a2: f32) -> f32 {

@@ -1,7 +1,7 @@
-//! Colours of thin films: light reflected off both sides of a film interferes (KHR_materials_iridescence).
+//! Thin-film iridescence: light reflected off both sides of a film interferes (KHR_materials_iridescence).
 //!
-//! L. Belcour, P. Barla, "A Practical Extension to Microfacet Theory for the Modeling of Varying Iridescence" (2017): the
-//! sum over the ways through the film, whose phases are integrated over the eye's sensitivity in closed form.
+//! L. Belcour, P. Barla, "A Practical Extension to Microfacet Theory for the Modeling of Varying Iridescence" (2017): the sum
+//! over the paths through the film, whose phases are integrated over the eye's sensitivity in closed form.
 
 use crate::math::Vec3;
 use crate::math::formula::{exp2, floor, sin_cos_of_turns};
@@ -12,16 +12,16 @@ use std::f32::consts::{LOG2_E, PI};
 /// Films thinner than this many nanometres fade out: without a film there is no boundary to reflect at.
 const FADE: f32 = 0.03;
 
-/// The eye's sensitivity in CIE XYZ as Gaussians over the wave number: height, centre and variance of each, a second one
-/// of X, and the whole of Y (Belcour and Barla, supplemental material).
+/// Sensitivity of the eye in CIE XYZ as Gaussians over the wave number: height, centre and variance of each, a second one of X,
+/// and the integral of Y (Belcour and Barla, supplemental material).
 const HEIGHTS: Vec3 = Vec3::new(5.4856e-13, 4.4201e-13, 5.2481e-13);
 const CENTERS: Vec3 = Vec3::new(1.6810e6, 1.7953e6, 2.2084e6);
 const VARIANCES: Vec3 = Vec3::new(4.3278e9, 9.3046e9, 6.6121e9);
 const SECOND_X: [f32; 3] = [9.7470e-14, 2.2399e6, 4.5282e9];
 const WHOLE: f32 = 1.0685e-7;
 
-/// Share of light that a film of index `ior`, `thickness` nanometres thick, on something that reflects `f0` face on sends
-/// back into empty space at this cosine; linear Rec. 709.
+/// Reflectance at this cosine, seen from empty space, of a film of index `ior`, `thickness` nanometres thick, on a base with
+/// reflectance `f0` at normal incidence; linear Rec. 709.
 pub(super) fn reflectance(ior: f32, thickness: f32, f0: Vec3, cosine: f32) -> Vec3 {
     let t = (thickness / FADE).clamp(0.0, 1.0);
     let ior = 1.0 + (ior - 1.0) * (t * t * (3.0 - 2.0 * t));
@@ -31,13 +31,13 @@ pub(super) fn reflectance(ior: f32, thickness: f32, f0: Vec3, cosine: f32) -> Ve
     }
     let cosine_inside = below.sqrt();
 
-    // The upper boundary, and the lower one to whatever index gives f0.
+    // The upper boundary, and the lower one to the index that f0 implies.
     let upper = fresnel_schlick(Vec3::splat(face_on(ior, 1.0)), 1.0, cosine).x;
     let through = 1.0 - upper;
     let base = f0.clamp(Vec3::ZERO, Vec3::splat(0.9999)).map(index_of);
     let lower = fresnel_schlick(base.map(|n| face_on(n, ior)), 1.0, cosine_inside);
 
-    // Reflection off something denser turns the phase by half a wave; off the upper side, seen from inside, it does not.
+    // Reflection off a denser medium shifts the phase by half a wave; off the upper side, seen from inside, it does not.
     let turned = |n: f32| if n < ior { PI } else { 0.0 };
     let phase = Vec3::splat(PI) + base.map(turned);
     let way = 2.0 * ior * thickness * cosine_inside;
@@ -53,7 +53,8 @@ pub(super) fn reflectance(ior: f32, thickness: f32, f0: Vec3, cosine: f32) -> Ve
     sum.max(Vec3::ZERO)
 }
 
-/// What light that is seen at this cosine by Schlick's formula, which is 1 at grazing angles, is seen as face on.
+/// Reflectance at normal incidence from which Schlick's formula, which is 1 at grazing angles, gives `reflectance` at this
+/// cosine.
 pub(super) fn seen_face_on(reflectance: Vec3, cosine: f32) -> Vec3 {
     let m = (1.0 - cosine).clamp(0.0, 1.0);
     let m2 = m * m;
@@ -61,19 +62,19 @@ pub(super) fn seen_face_on(reflectance: Vec3, cosine: f32) -> Vec3 {
     ((reflectance - grazing) / (1.0 - grazing)).clamp(Vec3::ZERO, Vec3::ONE)
 }
 
-/// Reflectance of a boundary, face on.
+/// Reflectance of a boundary at normal incidence.
 fn face_on(inside: f32, outside: f32) -> f32 {
     let part = (inside - outside) / (inside + outside);
     part * part
 }
 
-/// The index whose boundary to empty space reflects `f0` face on.
+/// Index of refraction whose boundary to empty space has reflectance `f0` at normal incidence.
 fn index_of(f0: f32) -> f32 {
     let root = f0.sqrt();
     (1.0 + root) / (1.0 - root)
 }
 
-/// Integral of cos(phase) over the eye's sensitivity for a way of so many nanometres and these shifts, in Rec. 709.
+/// Integral of cos(phase) over the eye's sensitivity for a path of `way` nanometres and these phase shifts, in Rec. 709.
 fn sensitivity(way: f32, shift: Vec3) -> Vec3 {
     let phase = 2.0 * PI * way * 1e-9;
     let gaussian = |height: f32, center: f32, variance: f32, shift: f32| {
@@ -96,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_film_without_thickness_leaves_the_surface_as_it_is() {
-        // Nearer to grazing, Schlick's formula sees a boundary even between equal indices.
+        // At more grazing angles, Schlick's formula sees a boundary even between equal indices.
         for cosine in [1.0, 0.9, 0.8] {
             let plain = fresnel_schlick(GLASS, 1.0, cosine);
             let filmed = reflectance(1.3, 0.0, GLASS, cosine);
@@ -111,7 +112,7 @@ mod tests {
         assert!(soap(5.0).max_element() < 0.005, "{}", soap(5.0));
         let white = soap(100.0);
         assert!(white.min_element() > 0.04 && white.max_element() < 1.5 * white.min_element(), "{white}");
-        // The way through the film is one wave of green: green is missing.
+        // The path through the film is one wave of green: green is missing.
         let purple = soap(550.0 / 2.0 / 1.33);
         assert!(purple.y < 0.6 * purple.x.min(purple.z), "{purple}");
         // One and a half: green is brightest.

@@ -1,11 +1,11 @@
-//! Lights as the points they shine on see them: direction, strength, and the way a shadow ray has to go.
+//! Lights as seen from the points they illuminate: direction, strength, and the extent of a shadow ray.
 //!
-//! Lights with an extent are seen as many points, each of which is drawn by the solid angle it stands for (P. Shirley,
-//! C. Wang, K. Zimmerman, "Monte Carlo Techniques for Direct Lighting Calculations", 1996).
+//! Area lights are sampled at points drawn by the solid angle they subtend (P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo
+//! Techniques for Direct Lighting Calculations", 1996).
 //!
-//! Two units meet here. The founding texts give a light a factor I, which is what a white matt surface facing it shows;
-//! glTF gives candela and lux, of which such a surface shows the π-th part. Both become a *strength* in the first unit,
-//! so that a Phong and a metallic-roughness surface of one colour look alike under any light.
+//! Two units meet here. The founding texts give a light a factor I, the value that a white diffuse surface facing it shows; glTF
+//! gives candela and lux, of which such a surface shows the π-th part. Both become a *strength* in the first unit, so that a
+//! Phong and a metallic-roughness surface of one colour look alike under any light.
 
 use crate::math::formula::sin_cos_of_turns;
 use crate::math::{DVec3, Vec3};
@@ -17,7 +17,7 @@ use std::f32::consts::PI;
 pub(crate) struct LocalLight {
     intensity: Vec3,
     pub shadows: bool,
-    /// Radius, or half the angle of a disc in the sky, as in [`Light`]; and what its sine and cosine are, were it that.
+    /// Radius, or half the angle of a disc in the sky, as in [`Light`]; then sine and cosine of that angle.
     size: f32,
     disc: (f32, f32),
     shape: Shape,
@@ -35,13 +35,13 @@ enum Shape {
     Rectangle {
         position: Vec3,
         sides: [Vec3; 2],
-        /// Unit vector to the side it shines to.
+        /// Unit vector to the side it emits to.
         normal: Vec3,
         falloff: Falloff,
     },
 }
 
-/// The cone of a spot light, as a line in the cosine from its axis (KHR_lights_punctual).
+/// Cone of a spot light, as a linear fade in the cosine from its axis (KHR_lights_punctual).
 #[derive(Clone, Copy, Debug)]
 struct Cone {
     axis: Vec3,
@@ -49,17 +49,17 @@ struct Cone {
     offset: f32,
 }
 
-/// The light that arrives at a point.
+/// Light that arrives at a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Incident {
     /// Unit vector towards the light.
     pub to_light: Vec3,
-    /// Where a shadow ray ends (centred frame); `None`: nowhere.
+    /// End of a shadow ray (centred frame); `None`: at infinity.
     pub position: Option<Vec3>,
     strength: Vec3,
 }
 
-/// A shadow ray to a point ends this far before it, in its own length: more than the rounding of its start.
+/// End of a shadow ray to a point, as a fraction of its length: the gap is more than the rounding of its start.
 const BEFORE_LIGHT: f32 = 1.0 - 4.0 * f32::EPSILON;
 
 impl Incident {
@@ -69,7 +69,7 @@ impl Incident {
         shadow_segment(origin, self.to_light, self.position)
     }
 
-    /// Radiance of a white matt surface that faces the light: the founding texts' I.
+    /// Radiance of a white diffuse surface that faces the light: the founding texts' I.
     #[inline(always)]
     pub(crate) fn strength(&self) -> Vec3 {
         self.strength
@@ -82,7 +82,7 @@ impl Incident {
     }
 }
 
-/// Direction and end of a shadow ray from `origin` to a light in this direction, at `position` if it is anywhere.
+/// Direction and end of a shadow ray from `origin` to a light in this direction, at `position` if it is not at infinity.
 #[inline(always)]
 pub(crate) fn shadow_segment(origin: Vec3, to_light: Vec3, position: Option<Vec3>) -> (Vec3, f32) {
     match position {
@@ -114,20 +114,20 @@ impl LocalLight {
         Self { intensity: light.intensity, shadows: light.shadows, size, disc, shape }
     }
 
-    /// Whether it is seen as many points.
+    /// Whether it is an area light, which is sampled.
     pub(crate) fn is_area(&self) -> bool {
         self.size > 0.0 || matches!(self.shape, Shape::Rectangle { .. })
     }
 
-    /// What arrives from one point of it, which is wide, drawn with two numbers from 0 … 1, as if all of it shone from there;
-    /// the mean of many is what arrives from the whole. `None` where nothing does.
+    /// Light from one point of this area light, drawn with two numbers from 0 … 1, with the strength of the whole; the mean of
+    /// many samples is the light of the whole. `None` where no light arrives.
     pub(crate) fn incident_from(&self, position: Vec3, at: [f32; 2]) -> Option<Incident> {
         debug_assert!(self.is_area());
         let (incident, arrives) = self.arriving_from(position, at);
         arrives.then_some(incident)
     }
 
-    /// The light that arrives, and whether any does.
+    /// Light that arrives from the sampled point, and whether any does.
     #[inline(always)]
     fn arriving_from(&self, position: Vec3, at: [f32; 2]) -> (Incident, bool) {
         let (to_light, share, end) = match self.shape {
@@ -141,10 +141,10 @@ impl LocalLight {
                 let along = way.dot(to_light);
                 let beside = (way - to_light * along).length();
                 let near = along - (self.size * self.size - beside * beside).max(0.0).sqrt();
-                // A ball fills more of the sky than its middle's distance says.
+                // A ball subtends more solid angle than its centre's distance suggests.
                 let fuller = if matches!(falloff, Falloff::None) { 1.0 } else { 2.0 / (1.0 + cos) };
                 let share = weaken(falloff, distance) * fuller * cone.map_or(1.0, |c| c.share(-to_light));
-                // Nothing is seen of a ball from inside.
+                // A ball is invisible from inside.
                 (to_light, if sin < 1.0 { share } else { 0.0 }, Some(position + to_light * near))
             }
             Shape::Rectangle { position: middle, sides: [a, b], normal, falloff } => {
@@ -159,14 +159,14 @@ impl LocalLight {
         (Incident { to_light, position: end, strength }, arrives)
     }
 
-    /// What arrives at `position` when nothing is in the way; `None` where nothing does.
+    /// Light that arrives at `position` if it is unoccluded; `None` where none does.
     pub(crate) fn incident(&self, position: Vec3) -> Option<Incident> {
         let (incident, arrives) = self.arriving(position);
         arrives.then_some(incident)
     }
 
-    /// What arrives at the first so many positions, of an area light from the place that is drawn for each with `at`, and whether
-    /// anything does.
+    /// Passes to `take` the light that arrives at each of the first `points` positions, and whether any does; for area lights
+    /// from the place drawn with `at`.
     #[inline(always)]
     pub(crate) fn arriving_at(
         &self,
@@ -174,7 +174,7 @@ impl LocalLight {
         (position, at): (impl Fn(usize) -> Vec3, impl Fn(usize) -> Option<[f32; 2]>),
         mut take: impl FnMut(usize, (Incident, bool)),
     ) {
-        // The shape is known outside the loop, which then is a formula.
+        // The shape is matched outside the loop, which is then branch-free.
         match self.shape {
             Shape::Directional(to_light) => {
                 let light = Self { shape: Shape::Directional(to_light), ..*self };
@@ -199,7 +199,7 @@ impl LocalLight {
         }
     }
 
-    /// Where it stands; `None`: nowhere.
+    /// Position of the light; `None`: at infinity.
     pub(crate) fn position(&self) -> Option<Vec3> {
         match self.shape {
             Shape::Directional(_) => None,
@@ -207,12 +207,12 @@ impl LocalLight {
         }
     }
 
-    /// What arrives at `position`, and whether anything does.
+    /// Light that arrives at `position`, and whether any does.
     #[inline(always)]
     fn arriving(&self, position: Vec3) -> (Incident, bool) {
         let (to_light, share, end) = match self.shape {
             Shape::Directional(to_light) => (to_light, 1.0 / PI, None),
-            // As seen from far away.
+            // As if seen from far away.
             Shape::Rectangle { position: light, normal, falloff, .. } => {
                 let way = light - position;
                 let to_light = way.try_normalize().unwrap_or(Vec3::ZERO);
@@ -232,7 +232,7 @@ impl LocalLight {
     }
 }
 
-/// What turns a light's intensity into its strength at `distance`: candela into lux over π; factors stay.
+/// Factor from a light's intensity to its strength at `distance`: candela to lux over π; 1 without falloff.
 #[expect(clippy::cast_possible_truncation, reason = "ranges are lengths like any other")]
 #[inline(always)]
 fn weaken(falloff: Falloff, distance: f32) -> f32 {
@@ -252,7 +252,7 @@ impl Cone {
         Self { axis, scale, offset: -outer * scale }
     }
 
-    /// The share of light that leaves along the unit vector `dir`: the square of the fade over the angle's cosine.
+    /// Share of the light emitted along the unit vector `dir`: the square of the fade over the angle's cosine.
     #[inline(always)]
     fn share(&self, dir: Vec3) -> f32 {
         let fade = (self.axis.dot(dir) * self.scale + self.offset).clamp(0.0, 1.0);
@@ -260,7 +260,7 @@ impl Cone {
     }
 }
 
-/// A direction in the cone around `axis` whose half angle has this sine and cosine, evenly by solid angle.
+/// Direction in the cone around `axis` whose half angle has this sine and cosine, uniform in solid angle.
 #[inline(always)]
 fn in_cone(axis: Vec3, (sin, cos): (f32, f32), at: [f32; 2]) -> Vec3 {
     // 1 − cos as sin² / (1 + cos), which keeps its digits in narrow cones.
@@ -323,7 +323,7 @@ mod tests {
         let spot = light(kind);
         let along = |tan: f32| spot.incident(Vec3::new(tan, 0.0, 0.0)).map(|i| i.strength().x);
         assert_eq!(along(0.0), Some(8.0));
-        // 45° from the axis: the cosine has come (cos 45° − cos 60°) / (1 − cos 60°) of its way.
+        // 45° from the axis: the fade is (cos 45° − cos 60°) / (1 − cos 60°).
         let fade = (0.5f32.sqrt() - 0.5) / 0.5;
         assert!((along(1.0).expect("inside the cone") - 8.0 * fade * fade).abs() < 1e-5);
         assert_eq!(along(2.0), None);

@@ -1,4 +1,4 @@
-//! The facets of a rough surface, drawn as they are seen: for rays that are spread over what it mirrors and lets through.
+//! Samples the visible microfacets of a rough surface, for rays spread over reflection and transmission.
 //!
 //! J. Dupuy, A. Benyoub, "Sampling Visible GGX Normals with Spherical Caps" (2023); R. L. Cook, T. Porter, L. Carpenter,
 //! "Distributed Ray Tracing" (1984).
@@ -9,7 +9,7 @@ use crate::render::optics::reflect;
 use std::f32::consts::PI;
 use std::sync::LazyLock;
 
-/// Facets around a normal: a GGX distribution with a width along each of two axes.
+/// GGX distribution of microfacets around a normal, with a width along each of two axes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lobe {
     along: Vec3,
@@ -24,19 +24,19 @@ impl Lobe {
         Self { along, across, normal, alpha }
     }
 
-    /// A lobe that is equally wide all around its normal.
+    /// An isotropic lobe.
     pub(crate) fn even(normal: Vec3, alpha: f32) -> Self {
         let (along, across) = normal.any_orthonormal_pair();
         Self::new([along, across], normal, [alpha; 2])
     }
 
-    /// The unit normal of a facet that is seen from `view`, drawn with two numbers from 0 … 1.
+    /// Unit normal of a facet visible from `view`, drawn with two numbers from 0 … 1.
     pub(crate) fn facet(&self, view: Vec3, at: [f32; 2]) -> Vec3 {
         let (sin, cos) = libm::sincosf(2.0 * PI * at[1]);
         self.facet_turned(view, at[0], [cos, sin])
     }
 
-    /// [`Self::facet`] with cosine and sine of the turn that the second number stands for.
+    /// [`Self::facet`] with cosine and sine of the rotation that the second number selects.
     #[inline(always)]
     pub(crate) fn facet_turned(&self, view: Vec3, at: f32, [cos, sin]: [f32; 2]) -> Vec3 {
         let [wide, narrow] = self.alpha;
@@ -50,7 +50,7 @@ impl Lobe {
         self.along * half.x + self.across * half.y + self.normal * half.z
     }
 
-    /// Share of the light from `to`, on either side, that other facets leave of what the drawn facets send to `view`.
+    /// Share of the light from `to`, on either side, that reaches `view` by the sampled facets without being masked by others.
     #[inline(always)]
     pub(crate) fn kept(&self, view: Vec3, to: Vec3) -> f32 {
         let (n_v, n_l) = (self.normal.dot(view).max(0.0), self.normal.dot(to).abs());
@@ -65,13 +65,13 @@ impl Lobe {
         if self.normal.dot(to) > 0.0 { self.kept(view, to) } else { 0.0 }
     }
 
-    /// How densely the directions that `view` is mirrored to lie where this facet mirrors it, 1/sr.
+    /// Probability density of mirroring `view` at this facet, per solid angle of the mirrored direction, 1/sr.
     #[inline(always)]
     pub(crate) fn density(&self, view: Vec3, facet: Vec3) -> f32 {
         self.facets(facet) / (2.0 * (self.normal.dot(view).max(0.0) + self.length(view)))
     }
 
-    /// Distribution × visibility of a light without extent, before Fresnel; all unit vectors, on the front.
+    /// Distribution × visibility for a light without extent, before Fresnel; all unit vectors, on the front.
     #[inline(always)]
     pub(super) fn highlight(&self, view: Vec3, to_light: Vec3) -> f32 {
         let half = (view + to_light).normalize_or(self.normal);
@@ -79,7 +79,7 @@ impl Lobe {
         self.facets(half) * (0.5 / (n_l * self.length(view) + n_v * self.length(to_light)))
     }
 
-    /// How many facets have this normal, 1/sr.
+    /// Density of facets with this normal, 1/sr.
     #[inline(always)]
     pub(super) fn facets(&self, normal: Vec3) -> f32 {
         let [wide, narrow] = self.alpha;
@@ -89,13 +89,13 @@ impl Lobe {
         1.0 / (PI * wide * narrow * squared * squared)
     }
 
-    /// What all facets together send back to `view` of light from everywhere, if they mirror all of it.
+    /// Directional albedo seen from `view`, if all facets are perfect mirrors.
     pub(super) fn albedo(&self, view: Vec3) -> f32 {
         Level::best().run(Albedo { lobe: self, view }) / DRAWN as f32
     }
 
-    /// The albedo seen at this cosine to the normal, where each facet mirrors a share by the cosine between it and the view; of a
-    /// lobe that has no grain.
+    /// Albedo seen at this cosine to the normal, where each facet mirrors a share by the cosine between it and the view; for an
+    /// isotropic lobe.
     pub(super) fn mirrored(&self, cosine: f32, share: impl Fn(f32) -> f32) -> f32 {
         let cosine = cosine.clamp(0.0, 1.0);
         let view = self.along * (1.0 - cosine * cosine).sqrt() + self.normal * cosine;
@@ -111,12 +111,12 @@ impl Lobe {
         Vec3::new(wide * v.dot(self.along), narrow * v.dot(self.across), v.dot(self.normal)).length()
     }
 
-    /// Whether a facet with this normal can be among them.
+    /// Whether a facet with this normal belongs to the front.
     pub(crate) fn is_on_front(&self, facet: Vec3) -> bool {
         facet.dot(self.normal) > 0.0
     }
 
-    /// About how much of the sphere they spread over what they mirror, sr.
+    /// Approximate solid angle over which the facets spread mirrored light, sr.
     pub(crate) fn solid_angle(&self) -> f32 {
         let [wide, narrow] = self.alpha;
         4.0 * PI * wide * narrow
@@ -129,24 +129,24 @@ impl Lobe {
     }
 }
 
-/// Facets that are drawn to find what all of them send back.
+/// Number of facets sampled for the albedo.
 const DRAWN: usize = 32;
 
-/// What draws them. From this turn on they are off by .009 of all light over grains of all widths (root mean square), by .03
-/// at most and by .001 in the mean.
+/// Pattern that draws them. With this first turn the error over grains of all widths is .009 of all light (root mean square), at
+/// most .03, and .001 in the mean.
 static PATTERN: LazyLock<[[f32; DRAWN]; 3]> = LazyLock::new(|| pattern(0.859_375));
 
-/// Numbers that draw `N` facets for equal shares of a lobe: 0 … 1, and cosine and sine of a turn, of which the first is so
-/// much of a whole one.
+/// Numbers that draw `N` facets for equal shares of a lobe: 0 … 1, and cosine and sine of a rotation, which starts at the
+/// fraction `first` of a turn.
 pub(crate) fn pattern<const N: usize>(first: f32) -> [[f32; N]; 3] {
-    /// The golden ratio's inverse: turns that never meet.
+    /// Inverse of the golden ratio: turns that never coincide.
     const GOLDEN: f32 = 0.618_034;
     let turn = |k: usize| libm::sincosf(2.0 * PI * (k as f32 * GOLDEN + first).fract());
     let at = std::array::from_fn(|k| (k as f32 + 0.5) / N as f32);
     [at, std::array::from_fn(|k| turn(k).1), std::array::from_fn(|k| turn(k).0)]
 }
 
-/// Sums what drawn facets send back.
+/// Kernel that sums the light of the sampled facets.
 struct Albedo<'a> {
     lobe: &'a Lobe,
     view: Vec3,
@@ -155,11 +155,11 @@ struct Albedo<'a> {
 impl Kernel for Albedo<'_> {
     type Output = f32;
 
-    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
+    // The lanes are plain arrays: the token `S` only tells which instructions the compiler may use.
     #[inline(always)]
     fn run<S: Simd>(self, _: S) -> f32 {
         let Self { lobe: Lobe { along, across, normal, alpha }, view } = self;
-        // All that matters are lengths along the axes: a mirror image sends back the same.
+        // Only lengths along the axes matter: a mirror image has the same albedo.
         let view = Vec3::new(view.dot(*along).abs(), view.dot(*across).abs(), view.dot(*normal));
         let (lobe, [at, cos, sin]) = (Lobe::new([Vec3::X, Vec3::Y], Vec3::Z, *alpha), &*PATTERN);
         let mut sent = [0.0; DRAWN];

@@ -1,8 +1,8 @@
-//! What a surface does with light: the material at a point, evaluated from factors, maps and vertex colours.
+//! Reflection and transmission of light: the material at a point, evaluated from factors, maps and vertex colours.
 //!
-//! Shading models answer two questions here: how a light's arrival is seen ([`Bsdf::lit`], [`Bsdf::lit_through`]),
-//! and how much of what lies in the mirrored and refracted direction is seen ([`Bsdf::bounce_weights`]). Which rays are
-//! sent, and what they find, is the tracer's business.
+//! Shading models answer two questions here: how much of a light's arriving light is seen ([`Bsdf::lit`], [`Bsdf::lit_through`]),
+//! and with what weights the mirrored and refracted directions are seen ([`Bsdf::bounce_weights`]). The tracer decides which rays
+//! are sent, and follows them.
 
 mod anisotropy;
 mod coat;
@@ -38,16 +38,16 @@ use crate::math::{Vec3, Vec4};
 use crate::scene::{AlphaMode, Material, MetalRough, Reflection, TextureRef};
 use std::f32::consts::PI;
 
-/// How a point of a surface is seen: unit vectors away from it, and from which side.
+/// View and normals at a point of a surface, unit vectors away from it, and the side it is seen from.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadingFrame {
-    /// For shading.
+    /// Shading normal.
     pub normal: Vec3,
-    /// Of the shape itself.
+    /// Geometric normal.
     pub geometric: Vec3,
-    /// Back along the ray.
+    /// Direction back along the ray.
     pub view: Vec3,
-    /// Whether it is seen from outside: from either side where light cannot enter.
+    /// Whether it is seen from outside: always, where light cannot enter.
     pub outside: bool,
 }
 
@@ -65,7 +65,7 @@ pub(crate) struct Bsdf {
     outside: bool,
     pub emission: Vec3,
     pub model: Model,
-    /// Its grain, fibres on it, and clear coat over all; seen from outside only.
+    /// Anisotropy, sheen and clear coat; visible from outside only.
     pub anisotropy: Option<AnisotropicLobe>,
     pub sheen: Option<SheenLobe>,
     pub coat: Option<CoatLobe>,
@@ -80,7 +80,7 @@ pub(crate) enum Model {
 }
 
 impl Model {
-    /// Its base colour.
+    /// Base colour.
     pub(crate) fn base(&self) -> Vec3 {
         match self {
             Self::Unlit(color) => *color,
@@ -94,19 +94,19 @@ impl Model {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct BounceWeights {
     pub reflected: Vec3,
-    /// The part of this that clear glass reflects: facets that stop some of it send that on through themselves.
+    /// Part of `reflected` that clear glass reflects: light that its facets mask passes on through other facets.
     pub glass: Vec3,
     pub refracted: Vec3,
 }
 
 impl BounceWeights {
-    /// Of a surface without facets.
+    /// Weights of a surface without microfacets.
     pub(crate) fn smooth(reflected: Vec3, refracted: Vec3) -> Self {
         Self { reflected, refracted, glass: Vec3::ZERO }
     }
 
-    /// What is mirrored where other facets leave this share: what they stop goes on through glass, and what runs into glass
-    /// again comes out after all.
+    /// Weight of reflection where other facets leave the share `kept`: light masked in glass passes on through it, and light that
+    /// enters glass again comes out after all.
     pub(crate) fn mirrored(&self, kept: f32) -> Vec3 {
         (self.reflected - self.glass) * kept + self.glass
     }
@@ -116,11 +116,11 @@ impl BounceWeights {
 pub(crate) struct Reader<'a> {
     pub store: &'a TextureStore<'a>,
     pub patch: Option<&'a Patch<'a>>,
-    /// What has been read already.
+    /// Texels that have been read already.
     pub known: &'a [Known],
 }
 
-/// What a map says at a point.
+/// Texel of a map at a point.
 #[derive(Clone, Copy)]
 pub(crate) struct Known {
     pub map: TextureRef,
@@ -130,7 +130,7 @@ pub(crate) struct Known {
 }
 
 impl Reader<'_> {
-    /// The map's linear RGBA; white where there is no map, or nothing to read it with.
+    /// Linear RGBA of the map; white where there is no map, or no mesh to read it on.
     #[inline]
     fn read(&self, map: Option<&TextureRef>, space: ColorSpace) -> Vec4 {
         let Some(map) = map else { return Vec4::ONE };
@@ -148,7 +148,7 @@ impl Reader<'_> {
         self.read(map, ColorSpace::Linear)
     }
 
-    /// The map's alpha; 1 where there is none.
+    /// Alpha of the map; 1 where there is none.
     fn alpha(&self, map: Option<&TextureRef>) -> f32 {
         let Some(map) = map else { return 1.0 };
         match self.known.iter().find(|known| known.map == *map && known.space != ColorSpace::SrgbCutOut) {
@@ -157,7 +157,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A channel of the map, as sharp as it is; 1 where there is no map, or nothing to read it with.
+    /// One channel of the map, at full resolution; 1 where there is no map, or no mesh to read it on.
     fn sharp<const CHANNEL: usize>(&self, map: Option<&TextureRef>) -> f32 {
         map.zip(self.patch).map_or(1.0, |(map, patch)| patch.channel::<CHANNEL>(map, self.store))
     }
@@ -175,13 +175,13 @@ impl Reader<'_> {
     }
 }
 
-/// Whether a material is there or not, by an opacity that is read as sharply as it is stored, however small it is seen: of its
-/// mean over what a cone covers most leaves would be less than their cutoff, and gone, or more, and solid.
+/// Whether a material has an alpha cutoff, whose opacity is read at full resolution, however small it is seen: with a mean over
+/// the footprint most leaves would fall below their cutoff and vanish, or rise above it and turn solid.
 pub(crate) fn is_cut_out(material: &Material) -> bool {
     matches!(material.alpha_mode, AlphaMode::Mask { .. })
 }
 
-/// What the map of a material's base colour says with its alpha.
+/// Colour space of a material's base colour map, given the role of its alpha.
 pub(crate) fn base_space(material: &Material) -> ColorSpace {
     match material.alpha_mode {
         AlphaMode::Opaque => ColorSpace::Srgb,
@@ -236,7 +236,7 @@ impl Bsdf {
         self
     }
 
-    /// This surface with the reflectance that maps say at this point.
+    /// This surface with the reflectance that maps give at this point.
     pub(crate) fn tinted(mut self, m: &MetalRough, reader: &Reader) -> Self {
         if let Model::MetalRough(core) = &mut self.model {
             core.tint(m, reader);
@@ -250,7 +250,7 @@ impl Bsdf {
         Self::read(material, reader.base(material).truncate(), &reader)
     }
 
-    /// The material as maps say, but for a grain, film, sheen and clear coat, as seen from outside.
+    /// The material with its maps, but without anisotropy, film, sheen and clear coat, as seen from outside.
     pub(crate) fn read(material: &Material, base: Vec3, reader: &Reader) -> Self {
         let emission = material.emission * reader.srgb(material.emission_map.as_ref());
         let model = match &material.reflection {
@@ -264,42 +264,42 @@ impl Bsdf {
         Self::base_layer(model, emission, true)
     }
 
-    /// A surface of this model without anything over it.
+    /// A surface of this model without further layers.
     pub(crate) fn base_layer(model: Model, emission: Vec3, outside: bool) -> Self {
         Self { outside, emission, model, anisotropy: None, sheen: None, coat: None }
     }
 
-    /// Whether nothing is seen of its surface but what rays find that go on from it.
+    /// Whether the surface itself shows no light, only what its secondary rays find.
     pub(crate) fn is_dark(&self) -> bool {
         !self.outside && self.is_dark_inside()
     }
 
-    /// Whether that is so from inside: of clear glass.
+    /// The same for a surface seen from inside: true of clear glass.
     pub(crate) fn is_dark_inside(&self) -> bool {
         self.emission == Vec3::ZERO && matches!(&self.model, Model::MetalRough(m) if m.is_clear())
     }
 
-    /// Share of what is under the clear coat that is seen through it.
+    /// Share of the light below the clear coat that passes through it.
     fn below_coat(&self) -> f32 {
         self.coat.as_ref().map_or(1.0, CoatLobe::clear)
     }
 
-    /// Share of what is under fibres and clear coat that is seen through both.
+    /// Share of the light below sheen and clear coat that passes through both.
     fn clear(&self) -> f32 {
         self.below_coat() * self.sheen.as_ref().map_or(1.0, SheenLobe::clear)
     }
 
-    /// Whether light does nothing to it.
+    /// Whether light has no effect on it.
     pub(crate) fn is_unlit(&self) -> bool {
         matches!(self.model, Model::Unlit(_))
     }
 
-    /// Whether it is seen in the dark.
+    /// Whether it is visible without light.
     pub(crate) fn shines(&self) -> bool {
         self.emission != Vec3::ZERO || self.is_unlit()
     }
 
-    /// What is seen of the light that arrives from everywhere, without a ray: on this side, and through frosted glass.
+    /// Light of the environment that is seen without a ray: on this side, and through frosted glass.
     pub(crate) fn ambient(&self, seen: &ShadingFrame, sky: &Sky, ambient: Vec3) -> [Vec3; 2] {
         let [below, through] = match &self.model {
             Model::Unlit(color) => [*color, Vec3::ZERO],
@@ -316,8 +316,8 @@ impl Bsdf {
         [all, through * self.clear()]
     }
 
-    /// What is seen of light of this radiance from one direction `to`, per solid angle, of all that [`Self::ambient`] shows on
-    /// this side; `ambient` comes from everywhere.
+    /// Contribution, per solid angle, of radiance from one direction `to` to what [`Self::ambient`] shows on this side; `ambient`
+    /// comes from everywhere.
     pub(crate) fn lit_around(&self, seen: &ShadingFrame, to: Vec3, radiance: Vec3, ambient: Vec3) -> Vec3 {
         let (normal, view, all) = (seen.normal, seen.view, radiance + ambient);
         let below = match &self.model {
@@ -335,28 +335,28 @@ impl Bsdf {
         sum
     }
 
-    /// From now on rough surfaces mirror and let through by rays that are spread, not by lookups.
+    /// Switches rough surfaces from lookups to spread rays, for reflection and transmission.
     pub(crate) fn spread_by_rays(&mut self) {
         if let Model::MetalRough(m) = &mut self.model {
             m.spread_by_rays();
         }
     }
 
-    /// Blurs what is seen along a path that rough surfaces have spread to this angle across, radians: on such paths narrow
-    /// highlights would be met by few rays, each far too bright (A. S. Kaplanyan, C. Dachsbacher, "Path Space Regularization
-    /// for Holistic and Robust Light Transport", 2013).
+    /// Roughens the surface for a path that rough surfaces have spread to this angle across, radians: on such paths few rays
+    /// would hit narrow highlights, each far too bright (A. S. Kaplanyan, C. Dachsbacher, "Path Space Regularization for Holistic
+    /// and Robust Light Transport", 2013).
     pub(crate) fn blur(&mut self, angle: f32) {
         if let Model::MetalRough(m) = &mut self.model {
             m.blur(blurred(angle));
         }
     }
 
-    /// Whether lights without extent are seen in what is under the clear coat so small that they must be widened.
+    /// Whether highlights of lights without extent below the clear coat are so narrow that they must be widened.
     pub(crate) fn has_narrow_highlight(&self) -> bool {
         matches!(&self.model, Model::MetalRough(m) if m.has_narrow_highlight())
     }
 
-    /// Widens the highlights of lights under the clear coat to this squared width α², where they are narrower.
+    /// Widens the highlights of lights below the clear coat to this squared width α², where they are narrower.
     pub(crate) fn widen_highlight(&mut self, to: f32) {
         if let Model::MetalRough(m) = &mut self.model {
             m.widen_highlight(to);
@@ -366,7 +366,7 @@ impl Bsdf {
         }
     }
 
-    /// The facets around this normal that spread rays; `None` where one ray does.
+    /// Lobe around this normal that spreads rays; `None` where a single ray suffices.
     pub(crate) fn lobe(&self, normal: Vec3) -> Option<Lobe> {
         let Model::MetalRough(m) = &self.model else { return None };
         let alpha = m.spreads()?;
@@ -381,11 +381,11 @@ impl Bsdf {
         }
     }
 
-    /// What is seen of a light on the viewer's side of the surface, whose normal before maps turn it is `horizon`.
+    /// Light reflected to the viewer from a light on the viewer's side of the surface, whose normal before maps is `horizon`.
     ///
-    /// From inside there is no highlight: what a light sends in was bent where it came in, so it does not arrive along the
-    /// straight line, and never so flat that all of it is mirrored. Light that thin walls lead along hundreds of
-    /// reflections would gain such a highlight at each.
+    /// From inside there is no highlight: light that enters was refracted there, so it does not arrive along the straight line,
+    /// and never at an angle of total reflection. Light guided through thin walls over hundreds of reflections would gain such a
+    /// highlight at each.
     pub(crate) fn lit(&self, horizon: Vec3, normal: Vec3, view: Vec3, light: &Incident) -> Vec3 {
         let below = match &self.model {
             Model::Unlit(_) => Vec3::ZERO,
@@ -396,14 +396,14 @@ impl Bsdf {
         self.lit_over(below, (horizon, normal, view), light.to_light, light.irradiance())
     }
 
-    /// What is seen of a metallic-rough surface on whose viewer's side so much light falls from there.
+    /// Like [`Self::lit`], of a metallic-rough surface, for irradiance `light` from `to_light`.
     pub(crate) fn lit_with_lobes(&self, horizon: Vec3, normal: Vec3, view: Vec3, to_light: Vec3, light: Vec3) -> Vec3 {
         let Model::MetalRough(m) = &self.model else { return Vec3::ZERO };
         let below = self.lit_below(m, normal, view, to_light) * light;
         self.lit_over(below, (horizon, normal, view), to_light, light)
     }
 
-    /// What the metallic-rough surface under fibres and clear coat shows: BRDF × N·L.
+    /// BRDF × N·L of the metallic-rough surface below sheen and clear coat.
     fn lit_below(&self, m: &MetalRoughBsdf, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
         match &self.anisotropy {
             _ if !self.outside => m.lit_inside(normal, view, to_light),
@@ -412,7 +412,7 @@ impl Bsdf {
         }
     }
 
-    /// What is seen where `below` comes from under fibres and clear coat, which show light of this irradiance, too.
+    /// Adds sheen and clear coat under the same irradiance over the light `below`.
     fn lit_over(
         &self,
         below: Vec3,
@@ -431,7 +431,7 @@ impl Bsdf {
         all
     }
 
-    /// What is seen of a light on the other side of the surface.
+    /// Light transmitted to the viewer from a light on the other side of the surface.
     pub(crate) fn lit_through(&self, normal: Vec3, view: Vec3, light: &Incident, crossing: &Crossing) -> Vec3 {
         match &self.model {
             Model::Phong(m) => m.lit_through(normal, view, light.to_light, crossing) * light.strength(),
@@ -440,7 +440,7 @@ impl Bsdf {
         }
     }
 
-    /// What is seen of so much light that falls on the other side of a metallic-rough surface from there.
+    /// The same for irradiance `light` on the other side of a metallic-rough surface.
     pub(crate) fn lit_through_lobes(&self, normal: Vec3, view: Vec3, to_light: Vec3, light: Vec3) -> Vec3 {
         match &self.model {
             Model::MetalRough(m) if m.is_translucent() => m.lit_through(normal, view, to_light) * light * self.clear(),
@@ -453,7 +453,7 @@ impl Bsdf {
         matches!(&self.model, Model::MetalRough(m) if m.is_translucent())
     }
 
-    /// How much of the mirrored and of the refracted direction is seen; `cosine` is that of the view.
+    /// Weights of the mirrored and the refracted direction; `cosine` is that of the view.
     pub(crate) fn bounce_weights(&self, cosine: f32, crossing: &Crossing) -> BounceWeights {
         let BounceWeights { reflected, glass, refracted } = match &self.model {
             Model::Unlit(_) => BounceWeights::default(),
@@ -464,12 +464,12 @@ impl Bsdf {
         BounceWeights { reflected: reflected * clear, glass: glass * clear, refracted: refracted * clear }
     }
 
-    /// The normal of the clear coat over it, and the weight of the mirror ray off that.
+    /// Normal of the clear coat, and the weight of the mirror ray off it.
     pub(crate) fn coat_reflection(&self) -> Option<(Vec3, f32)> {
         self.coat.as_ref().map(|coat| (coat.normal, coat.mirrored()))
     }
 
-    /// Whether light passes through it here.
+    /// Whether light can pass through it here.
     pub(crate) fn lets_light_in(&self) -> bool {
         match &self.model {
             Model::Phong(m) => m.transmission != Vec3::ZERO,
@@ -478,7 +478,7 @@ impl Bsdf {
         }
     }
 
-    /// Index of refraction of the inside (1: rays pass straight on), and its dispersion; `None` where there is no inside.
+    /// Index of refraction of the inside (1: rays pass straight), and its dispersion; `None` where there is no inside.
     pub(crate) fn refraction(&self) -> Option<(f32, f32)> {
         let (ior, dispersion) = match &self.model {
             Model::Phong(m) if m.transmission != Vec3::ZERO => (m.ior, m.dispersion),
@@ -489,7 +489,7 @@ impl Bsdf {
     }
 }
 
-/// Sheen and clear coat of a material at a point that sees such a share of its surroundings.
+/// Sheen and clear coat of a material at a point with this occlusion.
 pub(crate) fn overlays(
     m: &MetalRough,
     on: &LobeFrame,
@@ -505,20 +505,20 @@ pub(crate) fn overlays(
     (sheen, coat)
 }
 
-/// How rough what is seen along a path that rough surfaces have spread to this angle across, radians, is at least.
+/// Minimum roughness along a path that rough surfaces have spread to this angle across, radians.
 pub(crate) fn blurred(angle: f32) -> f32 {
     (0.5 * angle).sqrt().min(0.5)
 }
 
-/// Share of the surroundings that the occlusion map leaves open, which says `shade`.
+/// Share of the environment that an occlusion map with the value `shade` leaves open.
 #[inline(always)]
 pub(crate) fn occlusion(material: &Material, shade: f32) -> f32 {
     (1.0 + material.occlusion_strength * (shade - 1.0)).clamp(0.0, 1.0)
 }
 
-/// The share of light that a surface lets through to a point in its shadow: filtered by its colour.
+/// Share of light that passes through a surface to a point in its shadow: filtered by its colour.
 ///
-/// An absent texel lets everything through, one of a see-through material what its opacity and its colour leave.
+/// A gap lets everything through, a texel of a see-through material what its opacity and colour leave.
 pub(crate) fn shadow_filter(material: &Material, reader: &Reader) -> Vec3 {
     let base = reader.base(material);
     let solid = material.alpha_mode.covers(base.w);
@@ -535,21 +535,21 @@ pub(crate) fn shadow_filter(material: &Material, reader: &Reader) -> Vec3 {
     Vec3::splat(1.0 - solid) + passed.clamp(Vec3::ZERO, Vec3::ONE) * solid
 }
 
-/// Whether a material has an inside: back faces of what is thin are seen from outside, too.
+/// Whether a material has an inside: back faces of thin surfaces are seen from outside, too.
 pub(crate) fn has_inside(material: &Material) -> bool {
     material.reflection.transmits() && material.metal_rough().is_none_or(|m| m.thick)
 }
 
-/// How much of a light a mapped surface shows near the line where it turns away from it: 1 away from that line, 0 on it, so
-/// that where the surface ends does not cut off what its maps do.
+/// Factor on a light near the terminator of a mapped surface: 1 away from it, 0 on it, so that the end of the lit side does not
+/// cut off the detail of its maps.
 ///
-/// `horizon` is the normal without maps. M. J.-Y. Chiang, Y. K. Li, B. Burley, "Taming the Shadow Terminator" (2019), who
-/// compare with the facets of the mesh, which then show. 1 everywhere on surfaces without maps.
+/// `horizon` is the normal without maps. M. J.-Y. Chiang, Y. K. Li, B. Burley, "Taming the Shadow Terminator" (2019), who compare
+/// with the facets of the mesh, which then show. 1 everywhere on surfaces without maps.
 #[inline(always)]
 pub(crate) fn terminator(horizon: Vec3, shading: Vec3, to_light: Vec3) -> f32 {
     let agreement = shading.dot(to_light) * shading.dot(horizon);
     let g = horizon.dot(to_light) / agreement;
-    // Not a number where the shading normal is square to the light or to the surface: such light is not seen anyway.
+    // NaN where the shading normal is perpendicular to the light or to the surface: such light is not seen anyway.
     if g.is_nan() || g >= 1.0 {
         return 1.0;
     }

@@ -34,7 +34,7 @@ pub(crate) struct PhongInputs {
 }
 
 impl PhongInputs {
-    /// From the diffuse colour, and what maps of the others say.
+    /// Combines the diffuse colour, and the values of the other maps.
     #[inline(always)]
     pub(crate) fn of(phong: &Phong, diffuse: Vec3, (ambient, specular, shininess): (Vec3, Vec3, f32)) -> Self {
         Self {
@@ -67,20 +67,20 @@ impl PhongBsdf {
         }
     }
 
-    /// The numbers that maps have said.
+    /// Values of the parameters that maps change.
     pub(crate) fn inputs(&self) -> PhongInputs {
         let Self { ambient, diffuse, specular, mirror, shininess, .. } = *self;
         PhongInputs { ambient, diffuse, specular, mirror, shininess }
     }
 
-    /// This material with other numbers from maps.
+    /// This material with other map values.
     #[inline(always)]
     pub(crate) fn painted(&self, inputs: PhongInputs) -> Self {
         let PhongInputs { ambient, diffuse, specular, mirror, shininess } = inputs;
         Self { ambient, diffuse, specular, mirror, shininess, ..*self }
     }
 
-    /// Whether a ray off the surface could be seen.
+    /// Whether a mirror ray could be seen.
     pub(crate) fn mirrors(&self) -> bool {
         self.mirror != Vec3::ZERO
     }
@@ -93,26 +93,26 @@ impl PhongBsdf {
         self.lit_with(normal, to_light, highlight)
     }
 
-    /// Whether lights show as highlights.
+    /// Whether lights cause highlights.
     #[inline(always)]
     pub(crate) fn glows(&self) -> bool {
         self.specular != Vec3::ZERO
     }
 
-    /// cosα, 0 where that is negative.
+    /// cosα, clamped to 0.
     #[inline(always)]
     pub(crate) fn agreement(normal: Vec3, view: Vec3, to_light: Vec3) -> f32 {
         let cosine = view.dot(reflect(-to_light, normal));
         if cosine > 0.0 { cosine } else { 0.0 }
     }
 
-    /// cosⁿα of cosα.
+    /// cosⁿα for cosα = `agreement`.
     #[inline]
     pub(crate) fn highlight(&self, agreement: f32) -> f32 {
         libm::powf(agreement, self.shininess)
     }
 
-    /// [`Self::lit`] with cosⁿα: nothing but a formula.
+    /// [`Self::lit`] with cosⁿα given: a branch-free formula.
     #[inline(always)]
     pub(crate) fn lit_with(&self, normal: Vec3, to_light: Vec3, highlight: f32) -> Vec3 {
         let cosine = normal.dot(to_light);
@@ -120,7 +120,7 @@ impl PhongBsdf {
         if cosine > 0.0 { lit } else { Vec3::ZERO }
     }
 
-    /// Kd (N·L): the same without its highlight.
+    /// Kd (N·L): the same without the highlight.
     pub(super) fn scattered(&self, normal: Vec3, to_light: Vec3) -> Vec3 {
         self.diffuse * normal.dot(to_light).max(0.0)
     }
@@ -139,18 +139,18 @@ impl PhongBsdf {
         self.transmission * libm::powf(normal.dot(facet).abs(), self.shininess)
     }
 
-    /// The weight of the mirror ray of what lets no light in.
+    /// Weight of the mirror ray of an opaque material.
     #[inline(always)]
     pub(crate) fn reflected(&self, cosine: f32) -> Vec3 {
         let schlick = fresnel_schlick(self.mirror, 1.0, cosine);
         if self.fresnel && self.mirror != Vec3::ZERO { schlick } else { self.mirror }
     }
 
-    /// Without Fresnel the weights are the material's own, but what lets light in lets through no more than it does not mirror:
-    /// where all branches of a ray together weighed more than it, they would have no end. Total reflection adds what cannot
-    /// pass to the mirror.
-    /// With Fresnel an opaque surface reflects more at grazing angles (Schlick), and a transparent one splits the light by
-    /// the exact formula for dielectrics.
+    /// Without Fresnel the weights are the material's own, but a transparent one transmits no more than it does not mirror: if
+    /// all branches of a ray together weighed more than it, they would never end. Total internal reflection adds the blocked
+    /// transmission to the mirror.
+    /// With Fresnel an opaque surface reflects more at grazing angles (Schlick), and a transparent one splits the light by the
+    /// exact formula for dielectrics.
     pub(super) fn bounce_weights(&self, cosine: f32, crossing: &Crossing) -> BounceWeights {
         let share = fresnel_dielectric(f64::from(cosine), f64::from(crossing.n_i), f64::from(crossing.n_t));
         #[expect(clippy::cast_possible_truncation, reason = "a share of light")]
@@ -167,7 +167,7 @@ impl PhongBsdf {
             (false, false) => BounceWeights::smooth(self.mirror, Vec3::ZERO),
             (true, false) => BounceWeights::smooth(self.reflected(cosine), Vec3::ZERO),
             (true, true) => {
-                // Inside, what is turned back has been let in before and is not the mirror's to weaken.
+                // From inside, light turned back was transmitted before, and is not weakened by the mirror colour.
                 let inside = crossing.n_i > crossing.n_t;
                 let mirror = if inside { self.mirror.max(self.transmission) } else { self.mirror };
                 BounceWeights::smooth(mirror * share, self.transmission * (1.0 - share))

@@ -1,8 +1,8 @@
-//! Sheen of cloth: fibres that stand off a surface (KHR_materials_sheen).
+//! Sheen of cloth: fibres that stick out of a surface (KHR_materials_sheen).
 //!
-//! A. C. Estevez, C. Kulla, "Production Friendly Microfacet Sheen BRDF" (2017), with the visibility of D. Neubelt and
-//! M. Pettineo, "Crafting a Next-Gen Material Pipeline for The Order: 1886" (2013). What the fibres send back is taken off
-//! what is below them.
+//! A. C. Estevez, C. Kulla, "Production Friendly Microfacet Sheen BRDF" (2017), with the visibility of D. Neubelt and M.
+//! Pettineo, "Crafting a Next-Gen Material Pipeline for The Order: 1886" (2013). The light that the fibres reflect is subtracted
+//! from the layers below.
 
 use super::{Reader, ShadingFrame, Sky};
 use crate::math::Vec3;
@@ -12,25 +12,25 @@ use crate::scene::Sheen;
 use std::f32::consts::PI;
 use std::sync::OnceLock;
 
-/// Entries of [`ALBEDO`] by roughness and by N·V.
+/// Number of entries of [`ALBEDO`] by roughness and by N·V.
 const ENTRIES: usize = 33;
 
-/// Directional albedo of the white lobe: rows by roughness 0 … 1, columns by the root of N·V 0 … 1, which changes most where that
-/// is small. Each row is found when it is first needed.
+/// Directional albedo of the white lobe: rows by roughness 0 … 1, columns by the square root of N·V 0 … 1, as it changes most
+/// where N·V is small. Each row is computed on first use.
 static ALBEDO: [OnceLock<[f32; ENTRIES]>; ENTRIES] = [const { OnceLock::new() }; ENTRIES];
 
-/// The lobe is no thinner than this roughness makes it.
+/// Lower bound of the roughness of the lobe.
 const LEAST_ROUGHNESS: f32 = 0.07;
 
-/// The surroundings are looked up no sharper than this roughness: the lobe is wide even where it is thin.
+/// Lower bound of the roughness of environment lookups: the lobe is wide even where it is weak.
 const WIDE: f32 = 0.5;
 
-/// The fibres at one point.
+/// Sheen at one point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SheenLobe {
     pub color: Vec3,
     pub roughness: f32,
-    /// What all of them send back, seen from here.
+    /// Directional albedo of the fibres for this view, before colour.
     pub albedo: f32,
 }
 
@@ -45,7 +45,7 @@ impl SheenLobe {
         (color != Vec3::ZERO).then(|| Self { color, roughness, albedo: albedo(roughness, n_v) })
     }
 
-    /// Share of what is below that is seen.
+    /// Share of the light from below that passes through.
     #[inline(always)]
     pub(crate) fn clear(&self) -> f32 {
         1.0 - self.color.max_element() * self.albedo
@@ -62,32 +62,32 @@ impl SheenLobe {
         self.color * (lobe(alpha(self.roughness), normal.cross(half).length(), n_l, n_v) * n_l)
     }
 
-    /// What it shows of the surroundings.
+    /// Light of the environment that it reflects.
     pub(super) fn ambient(&self, seen: &ShadingFrame, sky: &Sky, ambient: Vec3) -> Vec3 {
         self.around(sky.blurred(seen.mirrored(), Self::blur(self.roughness)) + ambient)
     }
 
-    /// How rough a mirror would show the surroundings so blurred as fibres of this roughness do.
+    /// Roughness of a mirror with the same blur as fibres of this roughness.
     #[inline(always)]
     pub(crate) fn blur(roughness: f32) -> f32 {
         roughness.max(WIDE)
     }
 
-    /// What it shows of so much light around the mirrored view.
+    /// Reflection of this mean radiance around the mirrored view.
     #[inline(always)]
     pub(crate) fn around(&self, light: Vec3) -> Vec3 {
         self.color * self.albedo * light
     }
 }
 
-/// The lobe's parameter.
+/// Parameter α of the lobe.
 #[inline(always)]
 fn alpha(roughness: f32) -> f32 {
     let r = roughness.max(LEAST_ROUGHNESS);
     r * r
 }
 
-/// Distribution × visibility; `sine` is that of the half vector from the normal.
+/// Distribution × visibility; `sine` is that between the half vector and the normal.
 #[inline(always)]
 fn lobe(alpha: f32, sine: f32, n_l: f32, n_v: f32) -> f32 {
     let exponent = 1.0 / alpha;
@@ -95,12 +95,12 @@ fn lobe(alpha: f32, sine: f32, n_l: f32, n_v: f32) -> f32 {
     distribution / (4.0 * (n_l + n_v - n_l * n_v))
 }
 
-/// ∫ BRDF N·L over the hemisphere by midpoints, at most 1, for [`ENTRIES`] N·V from 0 to 1.
+/// Kernel for ∫ BRDF N·L over the hemisphere by midpoints, at most 1, for [`ENTRIES`] N·V from 0 to 1.
 struct Integral {
     alpha: f32,
 }
 
-/// Rows and columns of directions over one half of the hemisphere, which the other mirrors.
+/// Rows and columns of directions over one half of the hemisphere; the other is its mirror image.
 const ROWS: usize = 40;
 const COLUMNS: usize = 24;
 
@@ -132,13 +132,13 @@ impl Kernel for Integral {
     }
 }
 
-/// The roughness, or the root of N·V, of an entry of [`ALBEDO`].
+/// Roughness, or square root of N·V, of an entry of [`ALBEDO`].
 #[inline(always)]
 fn part(entry: usize) -> f32 {
     entry as f32 / (ENTRIES - 1) as f32
 }
 
-/// [`ALBEDO`] between its entries.
+/// [`ALBEDO`], interpolated between its entries.
 fn albedo(roughness: f32, n_v: f32) -> f32 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lies among the entries")]
     let place = |x: f32| {

@@ -1,4 +1,4 @@
-//! White light in a few wavelengths, for materials whose index depends on the wavelength.
+//! White light as a few wavelengths, for materials whose index of refraction depends on the wavelength.
 
 use crate::math::Vec3;
 use crate::math::primaries::rec_709_of_xyz;
@@ -6,16 +6,16 @@ use crate::math::primaries::rec_709_of_xyz;
 /// Number of parts that white light is split into.
 pub(crate) const BANDS: u8 = 12;
 
-/// One part of white light.
+/// One band of white light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Band {
     /// Wavelength, nanometres.
     pub wavelength: f32,
-    /// Linear colour; those of all bands add up to white.
+    /// Linear colour; those of all bands sum to white.
     pub color: Vec3,
 }
 
-/// The visible spectrum, 400 to 680 nm, in equal steps.
+/// Bands of the visible spectrum, 400 to 680 nm, in equal steps.
 ///
 /// Colours are the CIE 1931 matching functions (the fits of C. Wyman, P.-P. Sloan, P. Shirley, "Simple Analytic
 /// Approximations to the CIE XYZ Color Matching Functions", 2013) in Rec. 709, cut at zero because no screen shows pure

@@ -309,7 +309,7 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// How many of these samples, from the first on, are traced before the picture.
+    /// Number of these samples that are traced before the picture: the first of them.
     fn known(&self, samples: Range<u32>) -> u32 {
         self.first_samples.clamp(samples.start, samples.end) - samples.start
     }

@@ -1,7 +1,7 @@
-//! From a hit to the surface there: position with its error, normals, and the coordinates textures are read with.
+//! From a hit to the surface: position with error bound, normals, and texture coordinates.
 //!
-//! Evaluated once, for the hit that counts. Nothing here knows of light; materials are asked for their normal and bump maps,
-//! and for what tells where they are there at all. Whatever a file gives, normals come out finite and of unit length.
+//! Evaluated once, for the hit that counts. Nothing here knows of light; materials only provide their normal and bump maps, and
+//! their opacity. Whatever a file contains, normals come out finite and of unit length.
 
 use super::branch::ShadingPoint;
 use super::context::Context;
@@ -17,7 +17,7 @@ use crate::math::{Vec2, Vec3};
 use crate::scene::{Material, Mesh, Scene, TextureRef};
 use std::cell::Cell;
 
-/// What was hit, before anything about it is computed.
+/// The prim that was hit, before anything about it is computed.
 #[derive(Clone, Copy)]
 pub(crate) struct HitPrim<'a> {
     pub prim: u32,
@@ -52,15 +52,15 @@ impl<'a> HitPrim<'a> {
         Self { prim, instance, material_id, material, mesh, source }
     }
 
-    /// Whether a ray that leaves the surface cannot meet it again.
+    /// Whether a ray that leaves the surface cannot hit it again.
     fn is_planar(&self) -> bool {
         !matches!(self.source, PrimSource::Sphere(_) | PrimSource::Cone(_))
     }
 
     /// The part of the mesh around a hit; `None` on spheres, cones and planes, which have no texture coordinates.
     ///
-    /// `u`, `v` are the weights of a triangle's second and third corner, `position` is in the centred frame. Maps are read at
-    /// the point, as sharp as they are.
+    /// `u`, `v` are the barycentric coordinates of a triangle's second and third corner, `position` is in the centred frame. Maps
+    /// are read at the point, at full resolution.
     pub(crate) fn patch(&self, world: &World, u: f32, v: f32, position: Vec3) -> Option<Patch<'a>> {
         let (mesh, placement) = self.mesh?;
         let (corners, weights) = match self.source {
@@ -72,7 +72,7 @@ impl<'a> HitPrim<'a> {
         Some(Patch { mesh, placement, corners, weights, vertices, print, last: Cell::new(None), read: Cell::new(None) })
     }
 
-    /// The opacity where a ray has hit a triangle, of maps as sharp as they are; `None` on other shapes.
+    /// Opacity where a ray has hit a triangle, with maps read at full resolution; `None` on other shapes.
     pub(crate) fn opacity(&self, hit: &Hit, store: &TextureStore) -> Option<f32> {
         let PrimSource::Triangle { triangle, .. } = self.source else { return None };
         let (mesh, _) = self.mesh?;
@@ -101,8 +101,8 @@ impl<'a> HitPrim<'a> {
     }
 }
 
-/// The normal that a file gives for a point of a face: interpolated, of unit length, on whatever side the file has it.
-/// `None` where it gives none.
+/// Normal that a file gives for a point of a face: interpolated, of unit length, on whichever side the file has it. `None` where
+/// it gives none.
 pub fn given_normal(scene: &Scene, world: &World, prim: u32, at: &Refined) -> Option<Vec3> {
     HitPrim::new(scene, world, prim).patch(world, at.u, at.v, at.position)?.normal()
 }
@@ -114,9 +114,9 @@ fn polygon_run(mesh: &Mesh, source: PrimSource) -> (u32, u32) {
     (p.first, p.len)
 }
 
-/// The triangle of a polygon's fan that `position` lies in, or lies least outside of, and its weights there.
+/// The triangle of a polygon's fan that contains `position`, or is nearest to it, and the barycentric coordinates there.
 ///
-/// For attributes that are affine over the polygon, as projected coordinates are, any triangle gives the same answer.
+/// For attributes that are affine over the polygon, as projected coordinates are, any triangle gives the same result.
 fn fan_triangle(mesh: &Mesh, world: &World, prim: u32, source: PrimSource, position: Vec3) -> ([u32; 3], [f32; 3]) {
     let shapes = &world.shapes;
     let (first, len) = polygon_run(mesh, source);
@@ -142,19 +142,19 @@ pub(crate) struct Surface<'a> {
     pub patch: Option<Patch<'a>>,
     pub footprint: Footprint,
     pub position: Vec3,
-    /// Where secondary rays start, but for the offset along the normal.
+    /// Origin of secondary rays, before the offset along the normal.
     start: Vec3,
     /// Absolute error bound of `position` and `start`, per axis.
     pub error: Vec3,
-    /// Unit normal of the shape itself, turned to the side the ray comes from.
+    /// Unit normal of the shape itself, facing the ray's origin.
     pub geometric: Vec3,
-    /// Unit normal before maps turn it, on that side as a whole.
+    /// Unit normal before maps turn it, on the same side as `geometric`.
     smooth: Vec3,
     /// 1 where a mesh's own normal is on that side, else −1.
     side: f32,
-    /// Unit normal for shading, never turned away from the ray.
+    /// Unit shading normal, always facing the ray's origin.
     pub normal: Vec3,
-    /// Unit normal of the plane that lights must be above to shine on it: where a mesh stands for something round, not that
+    /// Unit normal of the plane that lights must be above to reach the point: where a mesh stands for a round surface, not that
     /// of the triangle.
     pub horizon: Vec3,
     /// Unit vector back along the ray.
@@ -170,7 +170,7 @@ impl<'a> Surface<'a> {
         let view = -ray.dir.try_normalize().unwrap_or(Vec3::Z);
         let mut patch = target.patch(world, refined.u, refined.v, refined.position);
 
-        // The winding in the world is turned round in mirrored instances; the file's front stays the front.
+        // Mirrored instances reverse the winding in the world; the file's front stays the front.
         let mirrored = patch.as_ref().is_some_and(|p| p.placement.mirrored);
         let winding = if refined.normal.is_normalized() { refined.normal } else { view };
         let outward = if mirrored { -winding } else { winding };
@@ -198,10 +198,9 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// Finds the shading normal: interpolated, turned by normal and bump map, and to the side of the ray.
+    /// Computes the shading normal: interpolated, turned by normal and bump map, and to the side of the ray.
     ///
-    /// The geometric normal decides the side, so normals that a file gives against its own winding still light the
-    /// face that is seen.
+    /// The geometric normal decides the side, so normals that contradict their own winding still light the visible face.
     pub(crate) fn shade_smoothly(&mut self, store: &TextureStore) {
         let Some(patch) = &self.patch else { return };
         let material = self.target.material;
@@ -214,18 +213,18 @@ impl<'a> Surface<'a> {
         self.normal = mapped_normal(patch, material, store, own, (side, self.geometric), self.view);
     }
 
-    /// 1 for a normal on the side that is seen, −1 for one on the other.
+    /// 1 for a normal on the visible side, −1 for one on the other.
     pub(super) fn side(&self, own: Vec3) -> f32 {
         side_of(own, self.geometric)
     }
 
-    /// What lobes over it lie on.
+    /// Frame of the lobes on this surface.
     pub(crate) fn lobe_frame(&self) -> LobeFrame<'_> {
         let Self { smooth, side, geometric, normal, view, .. } = *self;
         LobeFrame { patch: self.patch.as_ref(), smooth, side, geometric, normal, view }
     }
 
-    /// How its normal turns along both axes of the ray's cone before maps turn it.
+    /// Change of the normal, before maps turn it, along both axes of the ray's cone.
     pub(crate) fn bends(&self, context: &Context) -> [Vec3; 2] {
         let Footprint { along, across } = self.footprint;
         match (&self.patch, self.target.source) {
@@ -246,8 +245,8 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// How far its normal turns in `reach` of the ray's cone, with this normal map and its scale: the squares, summed over both
-    /// axes. Bump maps are not asked.
+    /// Squared change of the normal within `reach` of the ray's cone, with this normal map and its scale, summed over both axes.
+    /// Bump maps are ignored.
     pub(crate) fn turning(&self, context: &Context, reach: f32, (map, scale): (Option<&TextureRef>, f32)) -> f32 {
         let [along, across] = self.bends(context);
         let of_mesh = (along.length_squared() + across.length_squared()) * (reach * reach);
@@ -255,28 +254,28 @@ impl<'a> Surface<'a> {
         of_mesh + of_map.map_or(0.0, |(patch, map)| patch.turning_of_map(map, scale, context.textures, reach))
     }
 
-    /// Whether it is seen from outside: from either side where there is no inside.
+    /// Whether it is seen from outside: always, if there is no inside.
     pub(crate) fn is_outside(&self) -> bool {
         self.front || !has_inside(self.target.material)
     }
 
-    /// How it is seen.
+    /// View and normals for shading.
     pub(crate) fn seen(&self) -> ShadingFrame {
         ShadingFrame { normal: self.normal, geometric: self.geometric, view: self.view, outside: self.is_outside() }
     }
 
-    /// A ray from here along `dir` (of any length) up to `t_max`; it starts outside the error of the position, on the
-    /// side it goes to, and cannot meet the flat face it starts on.
+    /// A ray from here along `dir` (of any length) up to `t_max`; it starts outside the error bound of the position, on the side
+    /// it goes to, and cannot hit the flat face it starts on.
     pub(crate) fn ray(&self, dir: Vec3, t_max: f32, sample: u32) -> Ray {
         Ray { origin: self.origin(dir), t_min: 0.0, dir, t_max, exclude: self.excluded(), sample }
     }
 
-    /// The face that rays from here cannot meet again; [`NO_PRIM`] on round shapes, which they may.
+    /// The face that rays from here cannot hit again; [`NO_PRIM`] on round shapes, which they may.
     fn excluded(&self) -> u32 {
         if self.target.is_planar() { self.target.prim } else { NO_PRIM }
     }
 
-    /// Where rays towards `dir` start.
+    /// Origin of rays towards `dir`.
     pub(crate) fn origin(&self, dir: Vec3) -> Vec3 {
         offset_origin(self.start, self.error, self.geometric, dir)
     }
@@ -313,13 +312,13 @@ impl ShadingPoint for Surface<'_> {
     }
 }
 
-/// 1 for a normal of a mesh on the side that is seen, whose normal is `geometric`; −1 for one on the other.
+/// 1 for a mesh normal on the visible side, whose normal is `geometric`; −1 for one on the other.
 #[inline(always)]
 pub(crate) fn side_of(own: Vec3, geometric: Vec3) -> f32 {
     if own.dot(geometric) < 0.0 { -1.0 } else { 1.0 }
 }
 
-/// A mesh's own normal as maps turn it, on the side of the ray.
+/// A mesh's own normal turned by maps, on the side of the ray.
 #[inline]
 pub(crate) fn mapped_normal(
     patch: &Patch,
@@ -335,10 +334,10 @@ pub(crate) fn mapped_normal(
     facing(bumped * side, geometric, view)
 }
 
-/// Least cosine of the view with a normal for shading.
+/// Smallest cosine between the view and a shading normal.
 const GRAZING: f32 = 1e-2;
 
-/// Whether `view` sees the front of what has this normal, and not too flat.
+/// Whether `view` sees the front of a surface with this normal, and not at too grazing an angle.
 #[inline(always)]
 pub(crate) fn faces(normal: Vec3, view: Vec3) -> bool {
     normal.dot(view) >= GRAZING
@@ -346,11 +345,11 @@ pub(crate) fn faces(normal: Vec3, view: Vec3) -> bool {
 
 /// `normal`, turned just far enough that `view` sees its front.
 ///
-/// Interpolated and mapped normals may point away at silhouettes; unturned they would make black rims. The normal of the face
-/// itself, `geometric`, never does, however flat it is seen, and stays.
+/// Interpolated and mapped normals may point away at silhouettes; unturned they would cause black rims. The normal of the face
+/// itself, `geometric`, never does, at however grazing an angle, and stays.
 #[inline(always)]
 pub(crate) fn facing(normal: Vec3, geometric: Vec3, view: Vec3) -> Vec3 {
-    /// Of a normal that the file gives, and that was turned with its face.
+    /// Rounding of a normal that the file gives, and that was transformed with its face.
     const ROUNDING: f32 = 1e-6;
     let is_own = || (normal - geometric).abs().max_element() <= ROUNDING;
     if faces(normal, view) || (normal.dot(view) > 0.0 && is_own()) {

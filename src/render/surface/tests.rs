@@ -30,7 +30,7 @@ fn map() -> TextureRef {
     TextureRef { texture: 0, uv_set: 0, transform: UvTransform::default() }
 }
 
-/// The surface seen from +z (or −z) at (0.5, 0.25), or wherever the instance has put that point.
+/// The surface seen from +z (or −z) at (0.5, 0.25), or wherever the instance has moved that point.
 fn seen<T>(scene: &Scene, from: f32, look: impl FnOnce(Surface, &TextureStore) -> T) -> T {
     use crate::accel::{Accel, NoProbe, none::Unculled};
     let world = World::new(scene);
@@ -56,7 +56,7 @@ fn coordinates(scene: &Scene, map: &TextureRef) -> Coordinates {
 
 #[track_caller]
 fn assert_near(a: Vec3, b: Vec3) {
-    // Normal maps of eight bits cannot say more.
+    // Precision of 8-bit normal maps.
     assert!((a - b).length() < 6e-3, "{a} is not {b}");
 }
 
@@ -172,7 +172,7 @@ fn tangents_that_were_made_for_one_set_of_coordinates_are_of_no_other() {
     assert!((expected - Vec3::new(0.6, 0.2, 0.77)).length() > 0.1, "{expected}");
     crate::load::tangents::generate(&mut scene.meshes[0], TexCoords::default());
     assert_near(normal(&scene, 1.0), expected);
-    // Those of a file are of all.
+    // A file's tangents hold for all coordinate sets.
     scene.meshes[0].tangents_along = None;
     assert_near(normal(&scene, 1.0), Vec3::new(0.6, 0.2, 0.77));
 }
@@ -212,7 +212,7 @@ fn a_normal_that_points_away_is_turned_until_it_is_seen() {
     assert!(turned.dot(Vec3::Z) > 0.0 && turned.x > 0.9 && turned.is_normalized());
     assert_eq!(facing_z(Vec3::Z), Vec3::Z);
     assert!(facing_z(Vec3::NEG_Z).is_normalized());
-    // A face's own normal is right however flat it is seen, as long as it is seen.
+    // A face's own normal stays, at however grazing an angle, as long as it is visible.
     let flat = Vec3::new(1.0, 0.0, 1e-3).normalize();
     assert_eq!(facing(flat, flat, Vec3::Z), flat);
     let as_given = flat + Vec3::splat(2e-7);

@@ -1,6 +1,6 @@
-//! Stored texels -> linear numbers.
+//! Decodes stored texels to linear values.
 //!
-//! The sRGB curve of IEC 61966-2-1, tabulated once for every stored value, so that a lookup is exact and costs no power.
+//! The sRGB curve of IEC 61966-2-1, tabulated for every stored value, so that a lookup is exact and needs no `pow`.
 
 use super::ColorSpace;
 use crate::math::Vec4;
@@ -21,10 +21,10 @@ fn fixed(s: f64) -> u32 {
     (curve(s) * 65535.0 * f64::from(1 << FRACTION) + 0.5) as u32
 }
 
-/// Bits behind the point of what [`fixed8`] gives.
+/// Number of fractional bits in the values of [`fixed8`].
 pub(super) const FRACTION: u32 = 12;
 
-/// Linear value of a stored 8-bit colour, in units of 2⁻¹² steps of 1/65535.
+/// Linear value of each stored 8-bit colour, in units of 2⁻¹² steps of 1/65535.
 pub(super) fn fixed8(space: ColorSpace) -> &'static [u32; 256] {
     match space {
         ColorSpace::Srgb | ColorSpace::SrgbCutOut => &FIXED_SRGB8,
@@ -32,7 +32,7 @@ pub(super) fn fixed8(space: ColorSpace) -> &'static [u32; 256] {
     }
 }
 
-/// Stored 8-bit numbers that are no colours, in the units of [`fixed8`].
+/// Stored 8-bit data values (not colours), in the units of [`fixed8`].
 static FIXED_UNIT8: [u32; 256] = {
     let (mut table, mut i) = ([0; 256], 0);
     while i < 256 {
@@ -42,11 +42,11 @@ static FIXED_UNIT8: [u32; 256] = {
     table
 };
 
-/// Linear value of each 16-bit sRGB value; made when the first such bitmap is read.
+/// Linear value of each 16-bit sRGB value; computed when the first such bitmap is read.
 static SRGB16: LazyLock<Vec<f32>> =
     LazyLock::new(|| (0..=u16::MAX).map(|i| linear_from_srgb(f64::from(i) / 65535.0)).collect());
 
-/// The curve for one channel, 0…1 to 0…1.
+/// sRGB curve for one channel, 0…1 to 0…1.
 fn linear_from_srgb(s: f64) -> f32 {
     narrow(curve(s))
 }
@@ -60,18 +60,18 @@ fn narrow(x: f64) -> f32 {
     x as f32
 }
 
-/// The stored texels of a bitmap, row by row, and what their numbers mean.
+/// Stored texels of a bitmap, row by row, with their interpretation.
 #[derive(Clone, Copy)]
 pub(super) enum Texels<'a> {
-    /// And the table of colours.
+    /// With the decoding table of colours.
     Rgb8(&'a [[u8; 3]], &'static [f32; 256]),
-    /// And the table of colours.
+    /// With the decoding table of colours.
     Rgba8(&'a [[u8; 4]], &'static [f32; 256]),
     Rgba16(&'a [[u16; 4]], ColorSpace),
 }
 
 impl<'a> Texels<'a> {
-    /// The texels of a bitmap, for one meaning.
+    /// Texels of a bitmap, in one colour space.
     #[inline]
     pub(super) fn new(bitmap: &'a Bitmap, space: ColorSpace) -> Self {
         match &bitmap.pixels {
@@ -92,7 +92,7 @@ impl<'a> Texels<'a> {
     }
 }
 
-/// The linear value of each 8-bit colour.
+/// Linear value of each 8-bit colour.
 fn table8(space: ColorSpace) -> &'static [f32; 256] {
     match space {
         ColorSpace::Srgb | ColorSpace::SrgbCutOut => &SRGB8,
@@ -107,20 +107,20 @@ pub(super) fn decode8([r, g, b, a]: [u8; 4], colors: &[f32; 256]) -> Vec4 {
     Vec4::new(color(r), color(g), color(b), unit8(a))
 }
 
-/// A stored number that is no colour: what a table of these would hold, since the quotient in `f64` is never so near
-/// the middle of two `f32` that it matters.
+/// An 8-bit data value (not a colour), 0 … 1: the same as a table would hold, since the quotient in `f64` is never so near the
+/// middle of two `f32` that it matters.
 #[inline(always)]
 pub(super) fn unit8(code: u8) -> f32 {
     f32::from(code) / 255.0
 }
 
-/// A stored number of 16 bits that is no colour, 0 … 1.
+/// A 16-bit data value (not a colour), 0 … 1.
 #[inline(always)]
 pub(super) fn unit16(code: u16) -> f32 {
     f32::from(code) / 65535.0
 }
 
-/// As [`decode8`] does, of a texel without alpha.
+/// Like [`decode8`], for a texel without alpha.
 #[inline(always)]
 pub(super) fn solid8([r, g, b]: [u8; 3], colors: &[f32; 256]) -> Vec4 {
     let color = |c: u8| colors[usize::from(c)];

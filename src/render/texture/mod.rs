@@ -1,8 +1,8 @@
-//! Looking up textures: wrap, filter, and the right sharpness for the size of a pixel.
+//! Texture lookups: wrapping, filtering, and the mip level that suits the footprint.
 //!
-//! Bitmaps stay as they were stored; texels are decoded when read (`decode`), and smaller copies exist only once a lookup
-//! needs them (`pyramid`). A footprint longer than wide is covered by several probes along its longer axis, the way of
-//! EXT_texture_filter_anisotropic (after McCormack, Perry, Farkas, Jouppi, *Feline*, 1999).
+//! Bitmaps stay as stored; texels are decoded when read (`decode`), and mip levels are built when a lookup first needs them
+//! (`pyramid`). An anisotropic footprint is covered by several probes along its major axis, as in EXT_texture_filter_anisotropic
+//! (after McCormack, Perry, Farkas, Jouppi, *Feline*, 1999).
 //!
 //! Every lookup is a pure function of the scene and its arguments: no state, no order, the same bits on every thread.
 
@@ -22,41 +22,41 @@ use pyramid::{Plane, Pyramid, Stored};
 use std::ops::{Add, Mul, Sub};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What the numbers of a bitmap mean; the slot that reads it decides.
+/// Interpretation of a bitmap's values; chosen by the slot that reads it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColorSpace {
-    /// Colours: red, green and blue follow the sRGB curve, alpha is linear and a number of its own.
+    /// Colours: red, green and blue follow the sRGB curve; alpha is linear and independent.
     Srgb,
-    /// Colours where alpha says what is there: it weights the colours in smaller copies.
+    /// Colours with alpha as coverage: it weights the colours in mip levels.
     SrgbCutOut,
     /// Data: four independent linear channels.
     Linear,
 }
 
-/// At most this many probes cover a long footprint.
+/// Maximum number of probes in an elongated footprint.
 const MAX_PROBES: f32 = 8.0;
 
-/// As a number of places.
+/// [`MAX_PROBES`] as an array length.
 const PROBES: usize = MAX_PROBES as usize;
 
 /// All textures of a scene, ready to be read.
 #[derive(Debug)]
 pub struct TextureStore<'a> {
     textures: &'a [Texture],
-    /// `None`: those that are empty, or not as large as they say.
+    /// `None` for a bitmap that is empty, or smaller than its header says.
     bitmaps: Vec<Option<Source<'a>>>,
-    /// What is read where there is no map.
+    /// Read where there is no map.
     stand_in: Option<Source<'static>>,
     surveys: Surveys,
 }
 
-/// What was found of maps that were surveyed, by texture, channel, and what its codes mean.
+/// Cached surveys of maps, by texture, channel and codes.
 type Surveys = Mutex<Vec<((u32, usize, Codes), Arc<Option<Survey>>)>>;
 
-/// The texture of maps that are not there.
+/// Texture index of missing maps.
 pub(super) const STAND_IN: u32 = u32::MAX;
 
-/// A bitmap and its smaller copies by what its numbers mean.
+/// A bitmap with its mip levels, by colour space.
 #[derive(Debug)]
 struct Source<'a> {
     bitmap: &'a Bitmap,
@@ -71,7 +71,7 @@ impl<'a> Source<'a> {
         Self { bitmap, srgb, cut_out, linear }
     }
 
-    /// The bitmap, read in one way.
+    /// The bitmap in one colour space, with one sampler.
     fn lookup(&self, space: ColorSpace, sampler: Sampler) -> Lookup<'_> {
         let pyramid = match space {
             ColorSpace::Srgb => &self.srgb,
@@ -89,35 +89,35 @@ impl<'a> TextureStore<'a> {
         Self { textures: &scene.textures, bitmaps: bitmaps.collect(), stand_in: None, surveys: Surveys::default() }
     }
 
-    /// A store in which maps that are not there are read, too, for nothing (see [`no_prune`](super::no_prune)).
+    /// A store in which missing maps are read, too, without effect (see [`no_prune`](super::no_prune)).
     #[must_use]
     pub fn without_pruning(self) -> Self {
         Self { stand_in: Some(Source::new(&super::no_prune::GREY)), ..self }
     }
 
-    /// Columns and rows of a texture's bitmap; (1, 1) for a texture that does not exist.
+    /// Columns and rows of a texture's bitmap; (1, 1) for a missing texture.
     pub fn size(&self, texture: u32) -> Vec2 {
         self.find(texture).map_or(Vec2::ONE, |(_, source)| pixels(size_of(source.bitmap)))
     }
 
     /// Linear RGBA (straight alpha) of `texture` around `uv`.
     ///
-    /// `duvdx` and `duvdy` span the footprint: how `uv` changes from this sample to the next along two directions; zero
-    /// gives the magnification filter. A texture that does not exist or is empty is opaque white. Values that are not
-    /// finite are safe: such a `uv` counts as 0, such a footprint as unbounded.
+    /// `duvdx` and `duvdy` span the footprint: the change of `uv` from this sample to the next along two directions; zero selects
+    /// the magnification filter. A missing or empty texture is opaque white. Values that are not finite are safe: such a `uv`
+    /// counts as 0, such a footprint as unbounded.
     pub fn sample(&self, texture: u32, space: ColorSpace, uv: Vec2, duvdx: Vec2, duvdy: Vec2) -> Vec4 {
         let Some((sampler, source)) = self.find(texture) else { return Vec4::ONE };
         source.lookup(space, sampler).filtered(uv, duvdx, duvdy)
     }
 
-    /// Number `CHANNEL` of the linear RGBA of `texture` at `uv`, as sharp as it is: that of [`Self::sample`] with a footprint of
-    /// zero.
+    /// Channel `CHANNEL` of the linear RGBA of `texture` at `uv`, at full resolution: that of [`Self::sample`] with a footprint
+    /// of zero.
     pub(in crate::render) fn channel<const CHANNEL: usize>(&self, texture: u32, uv: Vec2) -> f32 {
         let [read] = self.channels::<CHANNEL, 1>(texture, &[[uv.x], [uv.y]], 1);
         read
     }
 
-    /// [`Self::channel`] at the first `count` of some places, by axis.
+    /// [`Self::channel`] at the first `count` of some places, given by axis.
     #[inline(always)]
     pub(in crate::render) fn channels<const CHANNEL: usize, const N: usize>(
         &self,
@@ -135,14 +135,14 @@ impl<'a> TextureStore<'a> {
         }
     }
 
-    /// How much linear texels change from `uv` to `reach` times each of two ways, which span a footprint as in [`Self::sample`]:
-    /// between single texels, of the level that suits the footprint, that lie at least one apart.
+    /// Change of the linear texels from `uv` to `reach` times each of two vectors, which span a footprint as in [`Self::sample`]:
+    /// between single texels, of the mip level that suits the footprint, at least one texel apart.
     pub(super) fn changes(&self, texture: u32, uv: Vec2, ways: [Vec2; 2], reach: f32) -> [Vec4; 2] {
         let Some((sampler, source)) = self.find(texture) else { return [Vec4::ZERO; 2] };
         source.lookup(ColorSpace::Linear, sampler).changes(uv, ways, reach)
     }
 
-    /// Where the channel of a map is clear or solid. Found once; `None` where that is nowhere, or would take long.
+    /// Clear and solid parts of a map's channel. Surveyed once; `None` where there are none, or where it would take long.
     pub(super) fn survey(&self, texture: u32, channel: usize, codes: Codes) -> Arc<Option<Survey>> {
         let mut surveys = self.surveys.lock().unwrap_or_else(PoisonError::into_inner);
         let what = (texture, channel, codes);
@@ -164,7 +164,7 @@ impl<'a> TextureStore<'a> {
     }
 }
 
-/// Whether there is anything to read, and as much as width and height promise.
+/// Whether a bitmap has texels, and as many as width and height promise.
 fn is_whole(bitmap: &Bitmap) -> bool {
     bitmap.texels() > 0 && bitmap.is_whole()
 }
@@ -178,7 +178,7 @@ fn pixels((width, height): (usize, usize)) -> Vec2 {
     Vec2::new(width as f32, height as f32)
 }
 
-/// One bitmap, read in one way.
+/// One bitmap, in one colour space, with its sampler.
 #[derive(Clone, Copy)]
 struct Lookup<'a> {
     bitmap: &'a Bitmap,
@@ -187,18 +187,18 @@ struct Lookup<'a> {
     sampler: Sampler,
 }
 
-/// The levels that the probes of one footprint read.
+/// Mip levels that the probes of one footprint read.
 #[derive(Clone, Copy)]
 enum Plan<'a> {
     One(Plane<'a>, Filter),
-    /// Two, and the share of the second.
+    /// Two levels, and the weight of the second.
     Between(Plane<'a>, Plane<'a>, Filter, f32),
 }
 
 impl<'a> Lookup<'a> {
-    /// The mean over a footprint.
+    /// Mean over a footprint.
     fn filtered(&self, uv: Vec2, duvdx: Vec2, duvdy: Vec2) -> Vec4 {
-        // The footprint's axes in texels.
+        // Lengths of the footprint's axes in texels.
         let texels = pixels(size_of(self.bitmap));
         let (dx, dy) = ((duvdx * texels).length(), (duvdy * texels).length());
         let (major, minor, axis) = if dx >= dy { (dx, dy, duvdx) } else { (dy, dx, duvdy) };
@@ -209,7 +209,7 @@ impl<'a> Lookup<'a> {
             return self.read(self.plan(f32::INFINITY), &Probes::one(uv));
         }
 
-        // As many probes as the footprint is longer than wide; files that ask for nearest texels get one.
+        // The number of probes is the footprint's aspect ratio; files that ask for nearest texels get one.
         let count = match self.sampler.minify {
             Filter::Nearest => 1.0,
             Filter::Linear => probes(major, minor),
@@ -218,7 +218,7 @@ impl<'a> Lookup<'a> {
         self.read(plan, &Probes { uv, axis, count })
     }
 
-    /// A number of the texels, as sharp as they are, at the first `count` of some places.
+    /// One value of the texels, at full resolution, at the first `count` of some places.
     #[inline(always)]
     fn sharp<const N: usize>(&self, [u, v]: &[[f32; N]; 2], count: usize, texel: impl Fn(usize) -> f32) -> [f32; N] {
         let (size, mut read) = (size_of(self.bitmap), [1.0; N]);
@@ -248,7 +248,7 @@ impl<'a> Lookup<'a> {
         })
     }
 
-    /// What to read where a probe covers 2^`lod` texels.
+    /// Levels to read where a probe covers 2^`lod` texels.
     fn plan(&self, lod: f32) -> Plan<'a> {
         let Sampler { magnify, minify, mipmaps, .. } = self.sampler;
         if lod <= 0.0 {
@@ -282,7 +282,7 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// A lookup in one level: how texels are stored is asked once, not for each.
+    /// Looks up one level: the storage format is matched once, not for each texel.
     fn level(&self, plane: &Plane, probes: &Probes, filter: Filter) -> Vec4 {
         match plane.texels {
             Stored::Level(texels) => {
@@ -296,26 +296,26 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// The mean of all probes.
+    /// Mean of all probes.
     #[inline(always)]
     fn mean(&self, plane: &Plane, probes: &Probes, filter: Filter, texel: impl Fn(usize) -> Vec4) -> Vec4 {
         if probes.count <= 1.0 {
             return self.tap((plane.width, plane.height), probes.uv, filter).read(&texel);
         }
-        // First where all of them lie, then what they say: so none waits for another.
+        // First the addresses of all probes, then their texels: so none waits for another.
         let (mut taps, mut count, mut k) = ([Tap::default(); PROBES], 0, 0.5);
         while k < probes.count {
             let uv = probes.uv + probes.axis * (k / probes.count - 0.5);
             taps[count % PROBES] = self.tap((plane.width, plane.height), uv, filter);
             (count, k) = (count + 1, k + 1.0);
         }
-        // So that the mean of what is the same everywhere is just that.
+        // Written so that the mean of equal texels is exact.
         let first = taps[0].read(&texel);
         let rest = taps.iter().take(count).skip(1);
         first + rest.fold(Vec4::ZERO, |sum, tap| sum + (tap.read(&texel) - first)) / probes.count
     }
 
-    /// What a probe reads of so many columns and rows.
+    /// Texels that a probe reads from a level of this size.
     #[inline(always)]
     fn tap(&self, (width, height): (usize, usize), uv: Vec2, filter: Filter) -> Tap {
         let x = Axis::new(uv.x, width, self.sampler.wrap_u, filter);
@@ -326,8 +326,8 @@ impl<'a> Lookup<'a> {
     }
 }
 
-/// The four texels around a place, the shares of the right and the lower ones, and whether they are mixed; if not, the first
-/// is read alone.
+/// The four texels around a place, the weights of the right and the lower ones, and whether they are interpolated; if not, only
+/// the first is read.
 #[derive(Clone, Copy, Default)]
 struct Tap {
     corners: [usize; 4],
@@ -352,23 +352,22 @@ impl Tap {
     }
 }
 
-/// How often one can be doubled without passing `x`: the whole part of its logarithm, 0 where that is negative or `x` is no
-/// number.
+/// Floor of log₂ `x`; 0 where that is negative or `x` is NaN.
 #[inline(always)]
 fn doublings(x: f32) -> u32 {
     let exponent = (x.to_bits() >> 23).saturating_sub(127);
     if x >= 1.0 { exponent } else { 0 }
 }
 
-/// How many times as long as `reach` of a way a step must be to come at least one texel far, 1 if that is far enough;
-/// `None` where no step does.
+/// Factor by which `reach` times the vector `way` must be stretched to span at least one texel, 1 if it does so already; `None`
+/// where no factor suffices.
 #[inline(always)]
 fn apart(way: Vec2, texels: Vec2, reach: f32) -> Option<f32> {
     let apart = (way * texels).length() * reach;
     ((apart > 0.0) & apart.is_finite()).then(|| (1.0 / apart).max(1.0))
 }
 
-/// As many probes as a footprint is longer than wide, rounded up; its axes are in texels.
+/// Aspect ratio of a footprint, rounded up to a number of probes; its axes are in texels.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "1 to 8")]
 fn probes(major: f32, minor: f32) -> f32 {
@@ -377,7 +376,7 @@ fn probes(major: f32, minor: f32) -> f32 {
     if truncated < times { truncated + 1.0 } else { truncated }
 }
 
-/// Where a lookup reads: at places of equal distance along `axis`, `uv` in the middle.
+/// Probes of a lookup: evenly spaced along `axis`, with `uv` in the middle.
 struct Probes {
     uv: Vec2,
     axis: Vec2,
@@ -390,7 +389,7 @@ impl Probes {
     }
 }
 
-/// The two texels next to a coordinate along one axis, and the share of the second.
+/// The two texels next to a coordinate along one axis, and the weight of the second.
 struct Axis {
     near: usize,
     far: usize,
@@ -398,7 +397,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// Coordinate `c` (0…1 over `len` texels, centres at halves) with its wrap; 0 stands in for one that is not finite.
+    /// Coordinate `c` (0…1 over `len` texels, centres at halves) with its wrap mode; one that is not finite counts as 0.
     #[inline]
     fn new(c: f32, len: usize, wrap: Wrap, filter: Filter) -> Self {
         let c = if c.is_finite() { c } else { 0.0 };
@@ -415,11 +414,11 @@ impl Axis {
     }
 }
 
-/// The texel that stands at place `i` of a row that goes on for ever.
+/// Texel index at place `i` of an endless row.
 #[inline]
 fn wrapped(i: i64, len: usize, wrap: Wrap) -> usize {
     match usize::try_from(i) {
-        // Nearly all of them; division takes its time.
+        // The common case; division is slow.
         Ok(i) if i < len => i,
         _ => wrapped_outside(i, len, wrap),
     }

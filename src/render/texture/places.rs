@@ -1,7 +1,7 @@
-//! Lookups at eight points side by side: where they read is found once for all maps that lie alike.
+//! Lookups at eight points side by side: texel addresses are computed once for all maps of the same layout.
 //!
-//! Maps of one material mostly have one size, one sampler and the same coordinates. The places are those that
-//! [`Lookup::filtered`](super::Lookup) finds one by one, and texels are summed in its order: the same bits.
+//! Maps of one material mostly share size, sampler and coordinates. The addresses are those that
+//! [`Lookup::filtered`](super::Lookup) computes one by one, and texels are summed in its order: the same bits.
 
 use super::pyramid::{self, Plane, Stored};
 use super::{ColorSpace, PROBES, TextureStore, apart, decode, doublings, pixels, probes, size_of};
@@ -11,10 +11,10 @@ use crate::math::{Vec2, Vec4};
 use crate::scene::{Filter, Mipmaps, Sampler, Wrap};
 use decode::Texels;
 
-/// One number of each of eight points.
+/// One value of each of eight points.
 type Eight = [f32; LANES];
 
-/// Texture coordinates of eight points, and how they change along both axes of what a sample covers.
+/// Texture coordinates of eight points, and their change along both axes of the footprint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Spots {
     pub uv: [Eight; 2],
@@ -29,7 +29,7 @@ impl Spots {
     }
 }
 
-/// How the texels of a bitmap lie, and how they are read.
+/// Size and sampler of a bitmap: what determines texel addresses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Layout {
     width: u32,
@@ -42,12 +42,12 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// That of a texture; `None` for one that is not there, or too large.
+    /// Layout of a texture; `None` for one that is missing or too large.
     pub(crate) fn of(store: &TextureStore, texture: u32) -> Option<Self> {
         let (sampler, source) = store.find(texture)?;
         let Sampler { magnify, minify, mipmaps, wrap_u, wrap_v, .. } = sampler;
         let (width, height) = size_of(source.bitmap);
-        // Numbers of texels are computed in 32 bits, and places in `f32`.
+        // Texel indices are computed in 32 bits, and places in `f32`.
         let texels = u32::try_from(width.checked_mul(height)?).ok()?;
         let (width, height, top) = (u32::try_from(width).ok()?, u32::try_from(height).ok()?, source.srgb.top());
         let small = texels < u32::MAX / 2 && width.max(height) < 1 << 23;
@@ -56,8 +56,8 @@ impl Layout {
     }
 }
 
-/// How much linear texels change at each of eight points from `uv` to `reach` times each of both axes, as
-/// [`TextureStore::changes`](super::TextureStore) finds it; only where `wanted`, elsewhere zero.
+/// Change of the linear texels at each of eight points from `uv` to `reach` times each of both axes, as
+/// [`TextureStore::changes`](super::TextureStore) computes it; zero except where `wanted`.
 #[inline(always)]
 pub(crate) fn changes(
     store: &TextureStore,
@@ -77,7 +77,7 @@ pub(crate) fn changes(
         *level = if layout.mipmaps == Mipmaps::None { 0 } else { doublings };
     }
     let (width, height) = (sides(layout.width, &level, 0), sides(layout.height, &level, 0));
-    // The point itself, and a step along each axis; how long that is.
+    // The point itself and a step along each axis, with the step's stretch factor.
     let (mut places, mut steps) = ([at.uv; 3], [[0.0; LANES]; 2]);
     for i in 0..LANES {
         #[expect(clippy::cast_precision_loss, reason = "sides are below 2²³")]
@@ -107,7 +107,7 @@ pub(crate) fn changes(
     changes
 }
 
-/// The texel in which each coordinate along one axis lies.
+/// Index of the texel that contains each coordinate along one axis.
 #[inline(always)]
 fn nearest(c: &Eight, sides: &[u32; LANES], wrap: Wrap) -> [u32; LANES] {
     let (c, mut places) = (periods(c, wrap), [0; LANES]);
@@ -119,7 +119,7 @@ fn nearest(c: &Eight, sides: &[u32; LANES], wrap: Wrap) -> [u32; LANES] {
     inside(&places, sides, wrap)
 }
 
-/// The sides of a map in the level so far above that of each point.
+/// Side lengths of a map, `above` levels above that of each point.
 #[inline(always)]
 fn sides(whole: u32, level: &[u32; LANES], above: u32) -> [u32; LANES] {
     let mut sides = [0; LANES];
@@ -129,7 +129,7 @@ fn sides(whole: u32, level: &[u32; LANES], above: u32) -> [u32; LANES] {
     sides
 }
 
-/// Coordinates within the part of the plane that repeats.
+/// Coordinates reduced to one period of the wrap mode.
 #[inline(always)]
 fn periods(c: &Eight, wrap: Wrap) -> Eight {
     let mut periods = [0.0; LANES];
@@ -144,20 +144,20 @@ fn periods(c: &Eight, wrap: Wrap) -> Eight {
     periods
 }
 
-/// Where lookups at eight points read.
+/// Texel addresses of lookups at eight points.
 pub(crate) struct Places {
-    /// Probes at each point, a whole number.
+    /// Number of probes at each point.
     probes: Eight,
     level: [u32; LANES],
-    /// 1 where the next level is read, too, and its share.
+    /// 1 where the next level is read, too; and its weight.
     between: [u32; LANES],
     share: Eight,
-    /// How far from a place, in texels, those that are mixed there begin: half of one, and 0 where only the nearest is read.
+    /// Offset from a place, in texels, of the first texel: ½ where texels are interpolated, and 0 where only the nearest is read.
     half: Eight,
     taps: [[Taps; PROBES]; 2],
 }
 
-/// Four texels at each point, and the shares of the right and the lower ones.
+/// Four texels at each point, and the weights of the right and the lower ones.
 #[derive(Clone, Copy)]
 struct Taps {
     corners: [[u32; LANES]; 4],
@@ -180,11 +180,11 @@ impl Default for Places {
 }
 
 impl Places {
-    /// Finds where maps of this layout are read.
+    /// Computes the texel addresses for maps of this layout.
     #[inline(always)]
     pub(crate) fn find(&mut self, layout: &Layout, at: &Spots) {
         let axis = self.choose_levels(layout, at);
-        // Nearly all texels are mixed: these have a kernel without a choice.
+        // Nearly all maps are interpolated: these have a branch-free kernel.
         if (layout.magnify, layout.minify) == (Filter::Linear, Filter::Linear) {
             self.find_taps::<true>(layout, at, &axis);
         } else {
@@ -198,7 +198,7 @@ impl Places {
         let levels = if self.between == [0; LANES] { 1 } else { 2 };
         let (mut p, mut k) = (0, 0.5);
         while k < most {
-            // Where there is one probe it lies in the middle.
+            // A single probe lies in the middle.
             let mut uv = at.uv;
             for (uv, axis) in uv.iter_mut().zip(axis) {
                 for i in 0..LANES {
@@ -213,12 +213,12 @@ impl Places {
         }
     }
 
-    /// Chooses levels and numbers of probes; gives the longer axis of what is covered.
+    /// Chooses mip levels and numbers of probes; returns the major axis of the footprint.
     #[inline(always)]
     fn choose_levels(&mut self, layout: &Layout, at: &Spots) -> [Eight; 2] {
         let size = pixels((layout.width as usize, layout.height as usize));
         let (mut axis, mut lod) = ([[0.0; LANES]; 2], [0.0; LANES]);
-        // Files that ask for nearest texels get one.
+        // Files that ask for nearest texels get one probe.
         let is_mixed = layout.minify == Filter::Linear;
         for i in 0..LANES {
             let [along, across] = at.axes(i);
@@ -228,7 +228,7 @@ impl Places {
             let bounded = major.is_finite() & minor.is_finite();
             let probes = if bounded & (major > 1.0) & is_mixed { probes(major, minor) } else { 1.0 };
             (axis[0][i], axis[1][i], self.probes[i]) = (longer.x, longer.y, probes);
-            // Up to one texel is read as it is; what has no bounds is as small as can be.
+            // Footprints up to one texel read level 0; unbounded ones the smallest level.
             lod[i] = if major <= 1.0 {
                 1.0
             } else if bounded {
@@ -258,12 +258,12 @@ impl Places {
         axis
     }
 
-    /// Linear RGBA (straight alpha) of a texture of the layout at the first points.
+    /// Linear RGBA (straight alpha) of a texture of the layout, at as many points as `to` has.
     #[inline(always)]
     pub(crate) fn read(&self, store: &TextureStore, (texture, space): (u32, ColorSpace), to: &mut [Vec4]) {
         let Some((sampler, source)) = store.find(texture) else { return };
         let lookup = source.lookup(space, sampler);
-        // Neighbours mostly read the same levels.
+        // Neighbouring points mostly read the same levels.
         let (mut level, mut plane, mut above) = (self.level[0], lookup.plane(self.level[0] as usize), None);
         for (i, to) in to.iter_mut().enumerate().take(LANES) {
             if self.level[i] != level {
@@ -279,7 +279,7 @@ impl Places {
         }
     }
 
-    /// Fetches most of what [`Self::read`] will ask for: where all maps of a layout are fetched first, none waits for memory.
+    /// Prefetches most texels of [`Self::read`]: where all maps of a layout are prefetched first, none waits for memory.
     #[inline(always)]
     pub(crate) fn prefetch<S: Simd>(&self, s: S, store: &TextureStore, (texture, space): (u32, ColorSpace)) {
         let Some((sampler, source)) = store.find(texture) else { return };
@@ -308,7 +308,7 @@ impl Places {
         }
     }
 
-    /// The mean of all probes of point `i`.
+    /// Mean of all probes of point `i`.
     #[inline(always)]
     fn mean(&self, above: usize, i: usize, texel: impl Fn(u32) -> Vec4) -> Vec4 {
         let one = |taps: &Taps| {
@@ -321,7 +321,7 @@ impl Places {
         if probes <= 1.0 {
             return one(&taps[0]);
         }
-        // So that the mean of what is the same everywhere is just that.
+        // Written so that the mean of equal texels is exact.
         let first = one(&taps[0]);
         let (mut sum, mut p, mut k) = (Vec4::ZERO, 1, 1.5);
         while k < probes {
@@ -333,8 +333,8 @@ impl Places {
 }
 
 impl Taps {
-    /// The four texels around each of `uv`, in the level so far above that of the point; four times the nearest one where
-    /// texels are not mixed.
+    /// Finds the four texels around each of `uv`, `above` levels above that of the point; four times the nearest one where texels
+    /// are not interpolated.
     #[inline(always)]
     fn find<const MIXED: bool>(
         &mut self,
@@ -357,7 +357,7 @@ impl Taps {
     }
 }
 
-/// The two texels next to each coordinate along one axis, and the share of the second.
+/// The two texels next to each coordinate along one axis, and the weight of the second.
 struct Pairs {
     near: [u32; LANES],
     far: [u32; LANES],
@@ -380,8 +380,8 @@ impl Pairs {
     }
 }
 
-/// The texels at places of rows that go on for ever, from one before the first to one behind the last of the part that
-/// [`periods`] gives: one row, two where every other is mirrored.
+/// Texel indices at places of endless rows, which may lie from one before the first to one behind the last of a period of
+/// [`periods`]: one row, or two where every other is mirrored.
 #[inline(always)]
 fn inside(places: &[i32; LANES], sides: &[u32; LANES], wrap: Wrap) -> [u32; LANES] {
     let mut texels = [0; LANES];
@@ -407,14 +407,14 @@ fn inside(places: &[i32; LANES], sides: &[u32; LANES], wrap: Wrap) -> [u32; LANE
     texels
 }
 
-/// The place in a row of `len` that is repeated; `place` is −`len` at least and less than 2 `len`.
+/// Place in a row of `len` that repeats; `place` is at least −`len` and less than 2 `len`.
 #[inline(always)]
 fn again(place: i32, len: i32) -> i32 {
     let up = if place < 0 { place + len } else { place };
     if up >= len { up - len } else { up }
 }
 
-/// The whole part of a level, which is not negative; there are fewer than 32 levels.
+/// Whole part of a level, which is not negative and less than 32.
 #[inline(always)]
 fn whole(lod: f32) -> u32 {
     integer(floor(lod.min(31.0))).cast_unsigned()

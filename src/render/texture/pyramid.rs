@@ -1,8 +1,8 @@
-//! Ever smaller copies of a bitmap (Williams, *Pyramidal Parametrics*, 1983), each made when a lookup first needs it.
+//! Mip levels of a bitmap (Williams, *Pyramidal Parametrics*, 1983), each built when a lookup first needs it.
 //!
-//! Each level is half the one before, rounded down, and each of its texels is the mean over exactly the area it covers:
-//! where a side is odd, texels that straddle a border count with the fraction that lies inside. Means are taken of linear
-//! values. Where alpha cuts colours out it weights them, so that what hides under transparent texels does not bleed out.
+//! Each level is half the one before, rounded down, and each of its texels is the mean over exactly the area it covers: where a
+//! side is odd, texels that straddle a border count with the fraction inside. Means are taken of linear values. Where alpha cuts
+//! colours out it weights them, so that colours hidden under transparent texels do not bleed out.
 
 use super::ColorSpace;
 use super::decode::{self, FRACTION, Texels};
@@ -18,7 +18,7 @@ pub(super) struct Pyramid {
     above: Vec<OnceLock<Level>>,
 }
 
-/// One smaller copy: linear RGBA, straight alpha, 16 bits a channel.
+/// One mip level: linear RGBA, straight alpha, 16 bits a channel.
 ///
 /// A step of 1/65535 is a twentieth of the darkest step of an 8-bit sRGB file.
 #[derive(Debug)]
@@ -29,18 +29,18 @@ struct Level {
 }
 
 impl Pyramid {
-    /// A pyramid with nothing made yet.
+    /// A pyramid without any level built.
     pub(super) fn new(bitmap: &Bitmap) -> Self {
         let longest = bitmap.width.max(bitmap.height).max(1);
         Self { above: (0..longest.ilog2()).map(|_| OnceLock::new()).collect() }
     }
 
-    /// The highest level, a single texel; 0 for a bitmap of one texel.
+    /// Index of the highest level, a single texel; 0 for a bitmap of one texel.
     pub(super) fn top(&self) -> usize {
         self.above.len()
     }
 
-    /// Level `level`, made if it is not there.
+    /// Level `level`, built if it is missing.
     #[inline]
     pub(super) fn plane<'a>(&'a self, bitmap: &'a Bitmap, space: ColorSpace, level: usize) -> Plane<'a> {
         let (width, height) = size(bitmap, level);
@@ -51,7 +51,7 @@ impl Pyramid {
         Plane { width, height, texels }
     }
 
-    /// Whether a level that is there is known to be solid.
+    /// Whether a level that exists is known to be opaque.
     fn is_solid(&self, bitmap: &Bitmap, level: usize) -> bool {
         match level {
             0 => matches!(bitmap.pixels, Pixels::Rgb8(_)),
@@ -59,13 +59,13 @@ impl Pyramid {
         }
     }
 
-    /// Level `level` > 0.
+    /// Level `level` > 0, built if it is missing.
     #[inline]
     fn level(&self, bitmap: &Bitmap, space: ColorSpace, level: usize) -> &Level {
         self.above[level - 1].get().unwrap_or_else(|| self.made(bitmap, space, level))
     }
 
-    /// Makes a level, unless another thread is quicker. It depends on the bitmap alone, so it does not matter which.
+    /// Builds a level, unless another thread is faster. It depends on the bitmap alone, so it does not matter which one does.
     #[cold]
     #[inline(never)]
     fn made(&self, bitmap: &Bitmap, space: ColorSpace, level: usize) -> &Level {
@@ -120,7 +120,7 @@ impl Plane<'_> {
         self.at(y * self.width + x)
     }
 
-    /// A texel by number, row by row.
+    /// Linear RGBA of a texel by index, row by row.
     #[inline(always)]
     pub(super) fn at(&self, index: usize) -> Vec4 {
         match self.texels {
@@ -129,7 +129,7 @@ impl Plane<'_> {
         }
     }
 
-    /// Fetches a texel that will be asked for; of kinds that most maps are not, none.
+    /// Prefetches a texel; does nothing for rare formats.
     #[inline(always)]
     pub(super) fn prefetch<S: Simd>(&self, s: S, index: usize) {
         match self.texels {
@@ -155,13 +155,13 @@ fn unit(texel: &[u16; 4]) -> Vec4 {
     codes(texel) / 65535.0
 }
 
-/// What is stored, 0 … 65535.
+/// Stored codes, 0 … 65535.
 #[inline(always)]
 pub(super) fn codes(&[r, g, b, a]: &[u16; 4]) -> Vec4 {
     Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a))
 }
 
-/// The next smaller copy of a level.
+/// The next smaller level.
 fn halve(from: &Plane, to: (usize, usize), space: ColorSpace) -> Paged<[u16; 4]> {
     let columns: Vec<Span> = (0..to.0).map(|x| Span::new(x, from.width, to.0)).collect();
     let mut texels = Paged::zeroed(to.0 * to.1);
@@ -174,7 +174,7 @@ fn halve(from: &Plane, to: (usize, usize), space: ColorSpace) -> Paged<[u16; 4]>
     texels
 }
 
-/// Halves a level where each texel is the mean of exactly four, which come as upper left and right, lower left and right.
+/// Halves a level where each texel is the mean of exactly four, passed as upper left and right, lower left and right.
 fn halve_evenly<T>(texels: &[T], width: usize, mean: impl Fn([&T; 4]) -> [u16; 4]) -> Paged<[u16; 4]> {
     let mut halves = Paged::zeroed(texels.len() / 4);
     for (row, rows) in halves.chunks_exact_mut(width / 2).zip(texels.chunks_exact(2 * width)) {
@@ -185,13 +185,13 @@ fn halve_evenly<T>(texels: &[T], width: usize, mean: impl Fn([&T; 4]) -> [u16; 4
     halves
 }
 
-/// Halves texels without alpha that are no colours: a row of sums of two, and then of four, a texel in each word.
+/// Halves data texels (not colours) without alpha: a row of sums of two, and then of four, with a texel in each word.
 fn halve_numbers(texels: &[[u8; 3]], width: usize) -> Paged<[u16; 4]> {
-    /// Of each number of a word 2, and all but its highest two bits.
+    /// In each 16-bit lane of a word: 2, and a mask of all but the highest two bits.
     const TWO: u64 = 0x0002_0002_0002_0002;
     const LOW: u64 = 0x3fff_3fff_3fff_3fff;
     let mut halves = Paged::zeroed(texels.len() / 4);
-    // A texel behind the last: words have room for four numbers.
+    // One texel of padding: words have room for four values.
     let mut sums = vec![0_u16; 3 * width + 3];
     for (row, rows) in halves.chunks_exact_mut(width / 2).zip(texels.chunks_exact(2 * width)) {
         let (upper, lower) = rows.split_at(width);
@@ -200,7 +200,7 @@ fn halve_numbers(texels: &[[u8; 3]], width: usize) -> Paged<[u16; 4]> {
         let (firsts, seconds) = (sums.as_chunks::<6>().0, sums[3..].as_chunks::<6>().0);
         for ((half, &[a, b, c, d, ..]), &[e, f, g, h, ..]) in row.iter_mut().zip(firsts).zip(seconds) {
             let sum = word([a, b, c, d]) + word([e, f, g, h]);
-            // A quarter of 257 times as many steps, rounded.
+            // A quarter of 257 times the sum, rounded.
             let mean = (sum << 6) + ((sum + TWO) >> 2 & LOW);
             *half = codes_of(mean | u64::from(u16::MAX) << 48);
         }
@@ -208,7 +208,7 @@ fn halve_numbers(texels: &[[u8; 3]], width: usize) -> Paged<[u16; 4]> {
     halves
 }
 
-/// What is stored of the mean of four texels without alpha; `light` has the colours as [`decode::fixed8`] gives them.
+/// Stored mean of four texels without alpha; `light` holds the colours as in [`decode::fixed8`].
 #[inline(always)]
 fn mean_solid8([a, b, c, d]: [&[u8; 3]; 4], light: &[u32; 256]) -> [u16; 4] {
     let light = |code: u8| light[usize::from(code)];
@@ -216,17 +216,17 @@ fn mean_solid8([a, b, c, d]: [&[u8; 3]; 4], light: &[u32; 256]) -> [u16; 4] {
     [sum(0), sum(1), sum(2), u16::MAX]
 }
 
-/// A quarter of a sum in units of 2⁻¹² steps, in steps.
+/// A quarter of a sum, from units of 2⁻¹² steps to steps.
 #[expect(clippy::cast_possible_truncation, reason = "four times 65535 steps at most")]
 #[inline(always)]
 fn rounded(sum: u32) -> u16 {
     ((sum + (1 << (FRACTION + 1))) >> (FRACTION + 2)) as u16
 }
 
-/// What is stored of the mean of four stored texels whose channels do not weigh each other.
+/// Stored mean of four stored texels whose channels do not weight each other.
 #[inline(always)]
 fn mean_of_codes(four: [&[u16; 4]; 4]) -> [u16; 4] {
-    /// Every other code of a word, with room for a sum of four, and 2 of each.
+    /// Every other code of a word, with room for a sum of four, and 2 in each lane.
     const HALF: u64 = 0x0000_ffff_0000_ffff;
     const TWO: u64 = 0x0000_0002_0000_0002;
     let [a, b, c, d] = four.map(|&codes| word(codes));
@@ -235,20 +235,19 @@ fn mean_of_codes(four: [&[u16; 4]; 4]) -> [u16; 4] {
     codes_of(mean(0) | mean(16) << 16)
 }
 
-/// Four codes in a word, the first one lowest.
+/// Packs four codes into a word, the first one lowest.
 #[inline(always)]
 fn word(codes: [u16; 4]) -> u64 {
     u64::from_le_bytes(bytemuck::cast(codes.map(u16::to_le)))
 }
 
-/// The four codes of a word.
+/// Unpacks the four codes of a word.
 #[inline(always)]
 fn codes_of(word: u64) -> [u16; 4] {
     bytemuck::cast::<_, [u16; 4]>(word.to_le_bytes()).map(u16::from_le)
 }
 
-/// What [`mean`] gives for four texels of equal shares. No maps over arrays here: they are not always inlined, and this
-/// makes most texels.
+/// [`mean`] of four texels of equal weight. No maps over arrays here: they are not always inlined, and this builds most texels.
 #[inline(always)]
 fn mean_of_four(a: Vec4, b: Vec4, c: Vec4, d: Vec4, space: ColorSpace) -> Vec4 {
     let (a, b, c, d) = (a * 0.25, b * 0.25, c * 0.25, d * 0.25);
@@ -260,8 +259,8 @@ fn mean_of_four(a: Vec4, b: Vec4, c: Vec4, d: Vec4, space: ColorSpace) -> Vec4 {
     (sum / plain.w).truncate().extend(plain.w)
 }
 
-/// The mean of four 8-bit texels, as it is stored; `light` has the colours as [`decode::fixed8`] gives them. Most pictures are
-/// solid, and then it is a matter of looking up and adding.
+/// Stored mean of four 8-bit texels; `light` holds the colours as in [`decode::fixed8`]. Most pictures are opaque, and then it
+/// takes only lookups and sums.
 #[inline(always)]
 fn mean8([a, b, c, d]: [&[u8; 4]; 4], colors: &[f32; 256], light: &[u32; 256], space: ColorSpace) -> [u16; 4] {
     if a[3] & b[3] & c[3] & d[3] < u8::MAX {
@@ -273,14 +272,14 @@ fn mean8([a, b, c, d]: [&[u8; 4]; 4], colors: &[f32; 256], light: &[u32; 256], s
     [sum(0), sum(1), sum(2), u16::MAX]
 }
 
-/// Whether a mean needs no weights: where everything is clear there is none to go by, and where everything is solid the
-/// two means are one.
+/// Whether a mean needs no alpha weights: where everything is clear there are none, and where everything is opaque both means are
+/// the same.
 #[inline]
 fn is_plain(mean: Vec4, space: ColorSpace) -> bool {
     space != ColorSpace::SrgbCutOut || mean.w <= 0.0 || mean.w >= 1.0
 }
 
-/// Which texels of the finer level one texel covers along one axis, and the share of each.
+/// The texels of the finer level that one texel covers along one axis, with their weights.
 struct Span {
     first: usize,
     count: usize,
@@ -303,7 +302,7 @@ impl Span {
     }
 }
 
-/// The mean of a block of texels.
+/// Mean of a block of texels.
 fn mean(columns: &Span, rows: &Span, space: ColorSpace, texel: &impl Fn(usize, usize) -> Vec4) -> Vec4 {
     let (mut plain, mut weighted) = (Vec4::ZERO, Vec4::ZERO);
     for (j, row_share) in rows.shares.iter().enumerate().take(rows.count) {
@@ -402,7 +401,7 @@ mod tests {
         let leaves = bitmap(4, 4, |x, _| if x % 2 == 0 { [255, 0, 0, 255] } else { [0, 0, 0, 0] });
         let top = top_of(&leaves, ColorSpace::SrgbCutOut);
         assert!((top - Vec4::new(1.0, 0.0, 0.0, 0.5)).abs().max_element() < 1e-4, "{top}");
-        // Elsewhere the channels have nothing to do with each other: alpha is a roughness, or is not read.
+        // In other colour spaces the channels are independent: alpha is a roughness, or is not read.
         for space in [ColorSpace::Srgb, ColorSpace::Linear] {
             assert!((top_of(&leaves, space).x - 0.5).abs() < 1e-4, "{space:?}");
         }

@@ -1,60 +1,59 @@
-//! Where a map says all around that nothing is there, or that everything is: how far from each place.
+//! Distance maps of a texture channel: how far around each place the map is clear throughout, or solid throughout.
 
 use super::{MAX_PROBES, Sampler, TextureStore, Wrap, doublings, pixels, size_of};
 use crate::math::Vec2;
 use crate::math::formula::floor;
 use crate::scene::{Bitmap, Filter, Mipmaps, Pixels};
 
-/// Sides of the cells by which a map is surveyed: so long that there are no more than these along the longer side of it, as
-/// far as whole cells cover it.
+/// Limit of the cells of a survey along the longer side of its map: cells are doubled in size until they fit, as long as whole
+/// cells cover the map.
 const CELLS: usize = 512;
 
-/// No map is surveyed by more cells than these: none that is larger and repeats with a side that cannot be halved.
+/// Maximum number of cells: larger maps that repeat and have a side that cannot be halved are not surveyed.
 const MOST: usize = 1 << 20;
 
-/// Texels on both sides of a place that a lookup reads, in widths of the largest ones: those next to it, each as far as it
-/// goes.
+/// Distance that a lookup reads to each side of a place, in widths of the largest texels: the neighbouring texels, each in full.
 const BESIDE: f32 = 1.5;
 
-/// Beyond these levels nothing is said.
+/// Number of levels surveyed; nothing is known beyond.
 const LEVELS: usize = 16;
 
-/// More than rounding changes where steps of levels and probes are.
+/// Margin for the rounding of level and probe computations.
 const ROUNDING: f32 = 1.02;
 
-/// What a channel of a map says, of 8 bits.
+/// Thresholds of an 8-bit channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Codes {
-    /// A place is clear with no more than this: it is as good as nothing there.
+    /// A place with no more than this is clear: the surface has a gap there.
     pub most: u8,
-    /// It is solid with no less: it is there as a whole. Beyond 255: nowhere.
+    /// A place with no less than this is solid. Beyond 255: nowhere.
     pub least: u16,
 }
 
-/// How far each cell of a map that is clear, or solid, is away from those that are not.
+/// Distance of each clear, or solid, cell of a map to the nearest one that is not.
 #[derive(Debug)]
 pub(crate) struct Survey {
     /// Columns and rows.
     cells: [usize; 2],
-    /// Texels along each side of a cell, and its inverse.
+    /// Texels along each side of a cell, and the inverse.
     side: f32,
     inverse: f32,
     size: Vec2,
     per_size: Vec2,
     wrap: [Wrap; 2],
-    /// Cells to the nearest one that is not clear, at most 127; below 0 those to the nearest one that is not solid.
+    /// Steps to the nearest cell that is not clear, at most 127; negative: to the nearest one that is not solid.
     steps: Vec<i8>,
-    /// Whether any is clear.
+    /// Whether any cell is clear.
     has_gaps: bool,
-    /// How far from its place, in texels, a lookup in a level reads.
+    /// Distance from its place, in texels, that a lookup in each level reads.
     reach: [f32; LEVELS],
-    /// Whether there are smaller copies, and whether several probes may be taken.
+    /// Whether there are mip levels, and whether several probes may be taken.
     levels: bool,
     several: bool,
 }
 
 impl Survey {
-    /// Surveys the channel of a map. `None` where nothing is clear and nothing solid, or that would take long.
+    /// Surveys the channel of a map. `None` where nothing is clear and nothing solid, or where it would take long.
     pub(crate) fn of(store: &TextureStore, texture: u32, channel: usize, codes: Codes) -> Option<Self> {
         let (sampler, source) = store.find(texture)?;
         let Sampler { minify, mipmaps, wrap_u, wrap_v, .. } = sampler;
@@ -101,13 +100,13 @@ impl Survey {
         self.size
     }
 
-    /// Whether it is clear anywhere.
+    /// Whether any part is clear.
     pub(crate) fn has_gaps(&self) -> bool {
         self.has_gaps
     }
 
-    /// How many texels from each place, in texels, everything is clear on both axes, or, below 0, solid; 0 where that is not
-    /// known.
+    /// Distance along both axes, in texels, around each place within which everything is clear or, if negative, solid; 0 where
+    /// that is unknown.
     #[inline(always)]
     pub(crate) fn room<const N: usize>(&self, [x, y]: &[[f32; N]; 2]) -> [f32; N] {
         let (columns, rows) = (self.cells_at(x, 0), self.cells_at(y, 1));
@@ -120,7 +119,7 @@ impl Survey {
         room
     }
 
-    /// The cells of coordinates, in texels, along an axis.
+    /// Cell indices of coordinates, in texels, along an axis.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "cast as small numbers")]
     fn cells_at<const N: usize>(&self, at: &[f32; N], axis: usize) -> [i32; N] {
@@ -141,32 +140,33 @@ impl Survey {
         cells
     }
 
-    /// How far from its place, in texels, a lookup may read whose footprint has axes of no more than these lengths, in texels.
+    /// Distance from its place, in texels, that a lookup may read with footprint axes no longer than these, in texels.
     #[inline]
     pub(crate) fn reach(&self, shorter: f32, longer: f32) -> f32 {
-        // What a probe covers is rounded up to a level, and the next one may be read.
+        // The width of a probe is rounded up to a level, and the next one may be read.
         let covered = if self.several { shorter.max(longer / MAX_PROBES) } else { longer };
         let level = if self.levels { doublings(2.0 * ROUNDING * covered) as usize } else { 0 };
         let probing = if self.several { 0.5 * ROUNDING * longer } else { 0.0 };
-        // Also where there is no number.
+        // NaN gives infinity.
         if longer >= 0.0 { self.reach[level.min(LEVELS - 1)] + probing } else { f32::INFINITY }
     }
 }
 
-/// How far from its place a lookup in a level reads along a side of so many texels; infinite in the last that is told of.
+/// Distance from its place that a lookup in a level reads along a side of `len` texels; infinite in the last surveyed level.
 fn reach(len: usize, level: usize) -> f32 {
     if level == LEVELS - 1 {
         return f32::INFINITY;
     }
-    // Where a side is not halved evenly texels are wider than two of those below, and have a part of one more on each side.
+    // Where a side is not halved evenly, texels are wider than two of the level below, and include a part of one more on each
+    // side.
     let side = |level: usize| (len >> level).max(1);
     let width = |level: usize| pixels((len, 0)).x / pixels((side(level), 0)).x;
     let more = (0..level).filter(|&below| side(below) != 2 * side(below + 1)).map(width);
     BESIDE * width(level) + more.sum::<f32>()
 }
 
-/// Which cells, of so many texels a side, have anything in them that is not clear, and anything that is not solid; `None` of a
-/// map that is the same everywhere.
+/// Masks of the cells, of `side` texels a side, that contain a texel that is not clear, and one that is not solid; `None` for a
+/// channel that is constant.
 fn cells_of(
     bitmap: &Bitmap,
     (channel, Codes { most, least }): (usize, Codes),
@@ -184,7 +184,7 @@ fn cells_of(
     })
 }
 
-/// The cells in which any texel is such, in either way.
+/// Masks of the cells that contain a texel with either property.
 fn cells_with<T>(
     texels: &[T],
     is_such: impl Fn(&T) -> [bool; 2],
@@ -203,10 +203,10 @@ fn cells_with<T>(
     [one, other]
 }
 
-/// The most steps that are told.
+/// Maximum number of steps stored.
 const FARTHEST: i8 = i8::MAX;
 
-/// How many steps, along rows, columns or both, each cell is away from one that is filled, at most [`FARTHEST`].
+/// Distance of each cell from the nearest filled one, in steps along rows, columns or both, at most [`FARTHEST`].
 fn steps([columns, rows]: [usize; 2], wrap: [Wrap; 2], filled: &[bool]) -> Vec<i8> {
     let mut steps: Vec<i8> = filled.iter().map(|&filled| if filled { 0 } else { FARTHEST }).collect();
     let [around, over] = wrap.map(|wrap| wrap == Wrap::Repeat);
@@ -236,7 +236,7 @@ fn steps([columns, rows]: [usize; 2], wrap: [Wrap; 2], filled: &[bool]) -> Vec<i
             *here = last;
         }
     };
-    // Down and up once is enough where nothing repeats.
+    // One pass down and one up suffice where nothing repeats.
     loop {
         let known = steps.clone();
         for y in 0..rows {
@@ -292,7 +292,7 @@ mod tests {
         }
     }
 
-    /// A map with an alpha of some codes, and spots of another on it.
+    /// A map with an alpha of random codes, and spots of another on it.
     fn spotted(
         random: &mut Random,
         ((width, height), sampler): ((u32, u32), Sampler),
@@ -313,7 +313,7 @@ mod tests {
         Scene { textures: vec![Texture { bitmap: 0, sampler }], bitmaps: vec![bitmap], ..Scene::default() }
     }
 
-    /// Maps of many sizes, read in all ways.
+    /// Maps of many sizes, with all samplers.
     fn kinds() -> impl Iterator<Item = ((u32, u32), Sampler)> {
         let sizes = [(64, 64), (128, 32), (37, 50), (127, 63), (1023, 8), (2048, 16), (33, 1)];
         sizes.into_iter().cycle().take(84).enumerate().map(|(round, size)| {
@@ -340,7 +340,7 @@ mod tests {
             let clear = Survey::of(&store, 0, 3, Codes { most, least: 256 }).unwrap();
             for _ in 0..3000 {
                 let at = Vec2::new(random.unit() * 3.0 - 1.0, random.unit() * 3.0 - 1.0);
-                // From far below a texel to many, round or long, in any direction.
+                // Footprints from far below a texel to many, round or elongated, in any direction.
                 let longer = libm::exp2f(random.unit() * 8.0 - 3.0);
                 let shorter = longer * libm::exp2f(-4.0 * random.unit());
                 let (sin, cos) = libm::sincosf(random.unit() * 7.0);

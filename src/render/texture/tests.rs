@@ -4,7 +4,7 @@ use crate::math::simd::LANES;
 use crate::scene::{Bitmap, Texture};
 use proptest::prelude::*;
 
-/// A scene with one bitmap and one texture on it.
+/// A scene with one bitmap and one texture of it.
 fn scene(width: u32, height: u32, sampler: Sampler, texel: impl Fn(u32, u32) -> [u8; 4]) -> Scene {
     let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
     let bitmap = Bitmap { name: String::new(), width, height, pixels: Pixels::Rgba8(texels) };
@@ -44,7 +44,7 @@ fn linear_is_halfway_between_two_centres_and_nearest_jumps_there() {
 
 #[test]
 fn beyond_the_border_each_wrap_shows_what_it_promises() {
-    // Texels 0, 100, 200; where each wrap lands one and a half texels beyond each border.
+    // Texels 0, 100, 200; results of each wrap mode one and a half texels beyond each border.
     let expected = [(Wrap::Repeat, [100.0, 100.0]), (Wrap::Mirror, [100.0, 100.0]), (Wrap::Clamp, [0.0, 200.0])];
     for (wrap, [left, right]) in expected {
         let sampler = Sampler { wrap_u: wrap, magnify: Filter::Nearest, ..Sampler::default() };
@@ -195,7 +195,7 @@ fn texels_change_by_their_slope_however_far_apart_they_are_read() {
     assert_eq!(store.changes(0, Vec2::ZERO, [Vec2::NAN, Vec2::ZERO], 1.0), [Vec4::ZERO; 2], "no footprint");
 }
 
-/// Numbers that lookups get, and some that they had better not.
+/// Typical coordinates, and some hostile ones.
 fn odd(random: &mut Random, size: f32) -> f32 {
     match (random.unit() * 40.0) as u32 {
         0 => 0.0,
@@ -280,7 +280,7 @@ fn what_is_the_same_everywhere_is_read_as_just_that_from_near_and_far() {
                 let mut way = |size: f32| Vec2::new(random.unit() * size, random.unit() * size);
                 let (uv, along, across) = (way(1.0), way(size), way(0.2 * size));
                 let alpha = store.sample(0, ColorSpace::Linear, uv, along, across).w;
-                // A cutoff of just that lets it stand.
+                // A cutoff of exactly that value keeps the texel.
                 assert_eq!(alpha, f32::from(code) / 255.0, "{code} {width}×{height} {uv} {along} {across}");
             }
         }

@@ -1,14 +1,14 @@
 //! glTF's metallic-roughness model (glTF 2.0, Appendix B) with the specular, ior and transmission extensions.
 //!
-//! Lights are seen through the microfacet model: GGX distribution, height-correlated Smith masking, Schlick's Fresnel.
-//! The surroundings are seen by one mirror ray where the surface is smooth, and by a lookup of the environment, as wide
-//! as the roughness makes it, where it is rough; in between the two are mixed, so that no edge shows. A lookup sends no
-//! ray: what stands in its way is known from the occlusion map only. Metals give all of it back, after several bounces
-//! between their facets if need be; of lights they show the first bounce, as the model says. Light passes rough glass
-//! unscattered apart from a part that is looked up; lights themselves are not seen through rough glass.
+//! Lights are seen through the microfacet model: GGX distribution, height-correlated Smith masking, Schlick's Fresnel. The
+//! environment is seen by one mirror ray where the surface is smooth, and by a lookup as wide as the roughness makes it, where it
+//! is rough; in between the two are blended, so that no edge shows. A lookup sends no ray: its occlusion is known from the
+//! occlusion map only. Metals reflect all of the environment's light, after several bounces between their facets if need be; of
+//! lights they show the first bounce, as the model says. Light passes rough glass unscattered apart from a part that is looked
+//! up; lights themselves are not seen through rough glass.
 //!
-//! A translucent surface scatters a share of what enters it to its other side, evenly in all directions: half spaces
-//! change places, and Fresnel takes off as much as if the light stood where it is mirrored.
+//! A translucent surface scatters a share of the light that enters it to its other side, uniformly in all directions: the half
+//! spaces are swapped, and Fresnel removes as much as if the light were mirrored at the surface.
 
 use super::facets::{AlbedoRow, albedo, mean_albedo, rebound};
 use super::highlight::{NARROWEST_HIGHLIGHT, highlight, is_narrow, least_square, squared_width};
@@ -20,13 +20,13 @@ use crate::render::optics::{fresnel_dielectric, fresnel_schlick, transmittance};
 use crate::scene::{DiffuseTransmission, Iridescence, MetalRough};
 use std::f32::consts::PI;
 
-/// Below this roughness the surroundings are seen by a ray alone.
+/// Below this roughness the environment is seen by a ray alone.
 const MIRROR_ROUGHNESS: f32 = 0.1;
-/// Rougher surfaces see their surroundings by a lookup alone.
+/// Above this roughness the environment is seen by a lookup alone.
 const MATT_ROUGHNESS: f32 = crate::scene::features::SMOOTH;
-/// Above this roughness the lookup has its largest part in what is seen through glass.
+/// Roughness from which on the lookup through glass has its largest share.
 const FROSTED_ROUGHNESS: f32 = 0.6;
-/// The largest part that is looked up; the rest goes straight through, so that glass never hides what it holds.
+/// Largest share that is looked up through glass; the rest passes straight, so that glass never hides its contents.
 const FROSTED_SHARE: f32 = 0.75;
 /// The model's parameters at one point.
 #[derive(Clone, Copy, Debug)]
@@ -34,18 +34,18 @@ pub(crate) struct MetalRoughBsdf {
     base: Vec3,
     metallic: f32,
     roughness: f32,
-    /// Along its grain; 0 where it has none.
+    /// Roughness along the grain; 0 without a grain.
     roughness_along: f32,
-    /// What a white surface with that grain sends back in all; 1 where it has none.
+    /// Albedo of a white surface with that grain; 1 without a grain.
     sent_back: f32,
-    /// Whether all that is mirrored and let through is seen by rays.
+    /// Whether reflection and transmission are seen by rays alone.
     by_rays: bool,
-    /// Reflection of the dielectric part, face on and grazing.
+    /// Reflectance of the dielectric part, at normal incidence and grazing.
     f0: Vec3,
     f90: f32,
-    /// Reflection of the metal part, face on.
+    /// Reflectance of the metal part at normal incidence.
     metal_f0: Vec3,
-    /// Whether a film changes both, or that of them which there is.
+    /// Whether a film changes both reflectances, as far as each part exists.
     filmed: bool,
     /// Share of the light entering the dielectric part that passes through instead of being scattered.
     transmission: f32,
@@ -55,10 +55,10 @@ pub(crate) struct MetalRoughBsdf {
     occlusion: f32,
     pub ior: f32,
     pub thick: bool,
-    /// What is left of light that passes through the whole of it, where that is not traced.
+    /// Transmittance of the whole thickness, where rays do not trace the inside.
     inside: Vec3,
     pub dispersion: f32,
-    /// α² of the highlights of lights at least.
+    /// Lower bound of α² in the highlights of lights.
     least_square: f32,
 }
 
@@ -73,8 +73,8 @@ pub(crate) struct MetalRoughInputs {
 }
 
 impl MetalRoughInputs {
-    /// From the base colour, the share of the surroundings that is open, and what the maps say of roughness and metalness, and
-    /// of light that is let through.
+    /// Combines the base colour, the unoccluded share of the environment, the texel `map` of roughness and metalness, and that of
+    /// transmission.
     #[inline(always)]
     pub(crate) fn of(m: &MetalRough, base: Vec3, occlusion: f32, (map, let_through): (Vec4, Vec4)) -> Self {
         Self {
@@ -87,22 +87,22 @@ impl MetalRoughInputs {
     }
 }
 
-/// What a point sees of its surroundings.
+/// Light of the environment at a point, and the factors of its reflection.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EnvironmentTerms {
     /// Cosine of the view, 0 … 1.
     pub n_v: f32,
-    /// The lobe's albedo: shares of f0 and f90.
+    /// Albedo of the lobe: shares of f0 and f90.
     pub shares: (f32, f32),
     /// Mean light over the hemisphere.
     pub diffuse: Vec3,
     /// Light around the mirrored view.
     pub mirrored: Vec3,
-    /// Share of the mirrored light that nothing stands in the way of.
+    /// Unoccluded share of the mirrored light.
     pub open: f32,
     /// Whether it is seen from outside.
     pub outside: bool,
-    /// What is turned back from inside before it is scattered, at least.
+    /// Lower bound of the light turned back from inside before it is scattered.
     pub turned_back: f32,
 }
 
@@ -111,7 +111,7 @@ pub(super) fn metallic_at(m: &MetalRough, reader: &Reader) -> f32 {
     (m.metallic * reader.linear(m.metal_rough_map.as_ref()).z).clamp(0.0, 1.0)
 }
 
-/// What the thickness of a material that absorbs light leaves of it.
+/// Transmittance of the thickness of a material that absorbs light.
 fn inside(m: &MetalRough, reader: &Reader) -> Vec3 {
     if m.absorption == Vec3::ZERO {
         return Vec3::ONE;
@@ -149,7 +149,7 @@ impl MetalRoughBsdf {
         bsdf
     }
 
-    /// Gives the dielectric part the reflectance that factors and maps say.
+    /// Sets the reflectance of the dielectric part from factors and maps.
     pub(super) fn tint(&mut self, m: &MetalRough, reader: &Reader) {
         let color = m.specular_color * reader.srgb(m.specular_color_map.as_ref());
         let specular = m.specular * reader.alpha(m.specular_map.as_ref());
@@ -158,20 +158,20 @@ impl MetalRoughBsdf {
         self.f90 = specular;
     }
 
-    /// The numbers that maps have said.
+    /// Values of the parameters that maps change.
     pub(crate) fn inputs(&self) -> MetalRoughInputs {
         let Self { base, metallic, roughness, occlusion, transmission, .. } = *self;
         MetalRoughInputs { base, metallic, roughness, occlusion, transmission }
     }
 
-    /// This material with other numbers from maps, where no film is over it.
+    /// This material with other map values, if it has no film.
     #[inline(always)]
     pub(crate) fn painted(&self, inputs: MetalRoughInputs) -> Self {
         let MetalRoughInputs { base, metallic, roughness, occlusion, transmission } = inputs;
         Self { base, metal_f0: base, metallic, roughness, occlusion, transmission, ..*self }
     }
 
-    /// Lets it scatter light to its other side.
+    /// Makes it scatter light to its other side.
     pub(super) fn thin(&mut self, diffuse_transmission: &DiffuseTransmission, reader: &Reader) {
         let color = diffuse_transmission.color * reader.srgb(diffuse_transmission.color_map.as_ref());
         self.share =
@@ -184,7 +184,7 @@ impl MetalRoughBsdf {
         self.share > 0.0
     }
 
-    /// Puts it under a film, as seen from the outside at this cosine.
+    /// Covers it with a film, seen from outside at this cosine.
     pub(super) fn cover(&mut self, iridescence: &Iridescence, cosine: f32, reader: &Reader) {
         let strength = (iridescence.strength * reader.linear(iridescence.strength_map.as_ref()).x).clamp(0.0, 1.0);
         let [thin, thick] = iridescence.thickness;
@@ -194,7 +194,7 @@ impl MetalRoughBsdf {
                 let share = iridescence::reflectance(iridescence.ior, thickness, f0, cosine);
                 f0.lerp(iridescence::seen_face_on(share, cosine), strength)
             };
-            // A part of which there is nothing needs no colours.
+            // A part with no share needs no colour.
             if self.metallic < 1.0 {
                 self.f0 = under(self.f0);
             }
@@ -205,14 +205,14 @@ impl MetalRoughBsdf {
         }
     }
 
-    /// Gives it a grain, which `view` sees on this normal.
+    /// Sets its grain, seen along `view` at this normal.
     pub(super) fn brush(&mut self, anisotropy: Option<&AnisotropicLobe>, normal: Vec3, view: Vec3) {
         if let Some(anisotropy) = anisotropy {
             (self.roughness_along, self.sent_back) = (anisotropy.roughness(), anisotropy.lobe(normal).albedo(view));
         }
     }
 
-    /// Makes it at least so rough.
+    /// Raises its roughness to at least this.
     pub(super) fn blur(&mut self, roughness: f32) {
         self.roughness = self.roughness.max(roughness);
     }
@@ -228,19 +228,19 @@ impl MetalRoughBsdf {
         self.least_square = least_square(self.roughness, to);
     }
 
-    /// α² of the highlights of lights at least, where narrow ones must be as wide as `to`; 0 where they are not narrow.
+    /// Lower bound of α² in the highlights of lights, where narrow ones must be as wide as `to`; 0 where they are not narrow.
     #[inline(always)]
     pub(crate) fn least_square_where_narrow(&self, to: f32) -> f32 {
         if self.has_narrow_highlight() { least_square(self.roughness, to) } else { 0.0 }
     }
 
-    /// This material with highlights of this α² at least.
+    /// This material with this lower bound of α² in highlights.
     #[inline(always)]
     pub(crate) fn at_least(&self, least_square: f32) -> Self {
         Self { least_square, ..*self }
     }
 
-    /// Shares of f0 and f90 in what its lobe sends back.
+    /// Shares of f0 and f90 in the albedo of its lobe.
     fn albedo(&self, n_v: f32) -> (f32, f32) {
         let (scale, bias) = albedo(self.mean_roughness(), n_v);
         if self.roughness_along == 0.0 {
@@ -250,12 +250,12 @@ impl MetalRoughBsdf {
         (scale * kept, bias * kept)
     }
 
-    /// From now on all that is mirrored and let through is seen by rays.
+    /// Switches reflection and transmission to rays alone.
     pub(super) fn spread_by_rays(&mut self) {
         self.by_rays = true;
     }
 
-    /// Whether what is mirrored is looked up, in part at least.
+    /// Whether reflection is looked up, at least in part.
     pub(crate) fn looks_up(&self) -> bool {
         !self.by_rays
     }
@@ -265,13 +265,13 @@ impl MetalRoughBsdf {
         self.transmission >= 1.0 && self.metallic <= 0.0
     }
 
-    /// How far its facets spread rays: the α of their distribution; `None` where one ray does.
+    /// Width α over which its facets spread rays; `None` where a single ray suffices.
     pub(super) fn spreads(&self) -> Option<f32> {
         (self.by_rays && self.roughness.max(self.roughness_along) >= NARROWEST_HIGHLIGHT)
             .then_some(self.roughness * self.roughness)
     }
 
-    /// The roughness of a surface that has no grain and spreads light as far in all.
+    /// Roughness of an isotropic surface that spreads light equally far overall.
     fn mean_roughness(&self) -> f32 {
         if self.roughness_along > self.roughness {
             (self.roughness * self.roughness_along).sqrt()
@@ -286,18 +286,18 @@ impl MetalRoughBsdf {
         (fresnel_schlick(self.f0, self.f90, cosine), fresnel_schlick(self.metal_f0, 1.0, cosine))
     }
 
-    /// Colour of the light that is scattered under the surface, before what the surface reflects is taken off.
+    /// Colour of the light scattered below the surface, before reflection is subtracted.
     #[inline(always)]
     fn scattered(&self) -> Vec3 {
         self.base * ((1.0 - self.metallic) * (1.0 - self.transmission) * (1.0 - self.share))
     }
 
-    /// Colour of the light that is scattered to the other side, before what the surface reflects is taken off.
+    /// Colour of the light scattered to the other side, before reflection is subtracted.
     fn scattered_through(&self) -> Vec3 {
         self.through * ((1.0 - self.metallic) * (1.0 - self.transmission) * self.share)
     }
 
-    /// Whether a ray off the surface could be seen.
+    /// Whether a mirror ray could be seen.
     pub(crate) fn mirrors(&self) -> bool {
         self.traced(true) > 0.0
     }
@@ -308,7 +308,7 @@ impl MetalRoughBsdf {
         self.lit_on_side(normal, view, to_light, true)
     }
 
-    /// BRDF × N·L, without highlights where it is seen from inside.
+    /// BRDF × N·L, without highlights if seen from inside.
     #[inline(always)]
     pub(crate) fn lit_on_side(&self, normal: Vec3, view: Vec3, to_light: Vec3, outside: bool) -> Vec3 {
         let a2 = squared_width(self.roughness).max(self.least_square);
@@ -319,14 +319,14 @@ impl MetalRoughBsdf {
         self.lit_by(normal, view, to_light, lobe)
     }
 
-    /// BRDF × N·L with another lobe: what it gives for the sum of both unit vectors, before Fresnel.
+    /// BRDF × N·L with another lobe: a function of the sum of both unit vectors, before Fresnel.
     #[inline(always)]
     pub(super) fn lit_by(&self, normal: Vec3, view: Vec3, to_light: Vec3, lobe: impl Fn(Vec3) -> f32) -> Vec3 {
         let (n_l, n_v) = (normal.dot(to_light), normal.dot(view));
         if n_l <= 0.0 || n_v <= 0.0 {
             return Vec3::ZERO;
         }
-        // Half of its length is the cosine between either and the direction in the middle.
+        // Half of its length is the cosine between either vector and the half vector.
         let between = view + to_light;
         let (dielectric, metal) = self.fresnel(0.5 * between.length());
         let diffuse = self.scattered() * ((1.0 - dielectric.max_element()) / PI);
@@ -334,7 +334,7 @@ impl MetalRoughBsdf {
         (diffuse + specular) * n_l
     }
 
-    /// BTDF × |N·L| of light on the other side.
+    /// BTDF × |N·L| of a light on the other side.
     pub(super) fn lit_through(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
         let (n_l, n_v) = (-normal.dot(to_light), normal.dot(view));
         if !self.is_translucent() || n_l <= 0.0 || n_v <= 0.0 {
@@ -345,7 +345,7 @@ impl MetalRoughBsdf {
         self.scattered_through() * ((1.0 - dielectric.max_element()) / PI * n_l)
     }
 
-    /// The surroundings without a ray: scattered and looked-up mirrored light, and what is looked up through frosted glass.
+    /// Light of the environment without a ray: scattered and looked-up mirrored light, and that looked up through frosted glass.
     pub(super) fn ambient(
         &self,
         seen: &ShadingFrame,
@@ -380,7 +380,7 @@ impl MetalRoughBsdf {
         [sum, self.passed(1.0 - taken) * self.inside * light * frosted]
     }
 
-    /// BRDF × N·L of what [`Self::ambient`] looks up first.
+    /// BRDF × N·L of the light that [`Self::ambient`] looks up on this side.
     pub(super) fn lit_around(&self, seen: &ShadingFrame, to: Vec3, anisotropy: Option<&AnisotropicLobe>) -> Vec3 {
         let (normal, view) = (seen.normal, seen.view);
         let looked_up = 1.0 - self.traced(seen.outside);
@@ -393,13 +393,13 @@ impl MetalRoughBsdf {
         (self.lit_by(normal, view, to, |between| lobe(between) * looked_up) * left + through) * self.occlusion
     }
 
-    /// BRDF × N·L of what is seen from inside: no highlight, and nothing of what is turned back.
+    /// BRDF × N·L seen from inside: no highlight, and without the light turned back.
     pub(super) fn lit_inside(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
         self.lit_by(normal, view, to_light, |_| 0.0) * (1.0 - self.turned_back(normal.dot(view), false))
     }
 
-    /// Share of the light along a direction from inside that its facets turn back: what is scattered lies below, so that both
-    /// and what passes through are no more than there is. 0 from outside, and where nothing is scattered.
+    /// Share of the light along a direction from inside that its facets turn back: scattering takes place below them, so that
+    /// scattered and transmitted light together are no more than arrives. 0 from outside, and where nothing is scattered.
     fn turned_back(&self, cosine: f32, outside: bool) -> f32 {
         let scatters = self.transmission < 1.0 && self.metallic < 1.0;
         if outside || !scatters || !self.thick || !self.lets_light_in() || self.ior <= 0.0 {
@@ -413,17 +413,17 @@ impl MetalRoughBsdf {
         }
     }
 
-    /// Roughness of the lobe that is looked up, if one is.
+    /// Roughness of the looked-up lobe, if there is one.
     pub(super) fn gloss(&self) -> Option<f32> {
         (self.traced(true) < 1.0).then(|| self.mean_roughness())
     }
 
-    /// What is scattered and mirrored of the surroundings, and the largest share that the dielectric part mirrors.
-    /// `rebound` is what [`rebound`] gives for the material.
+    /// Scattered and mirrored light of the environment, and the largest share that the dielectric part mirrors. `rebound` is the
+    /// result of [`rebound`] for the material.
     #[inline(always)]
     pub(crate) fn around(&self, around: &EnvironmentTerms, rebound: Vec3) -> (Vec3, f32) {
         let looked_up = 1.0 - self.traced(around.outside);
-        // Rays that are spread are lost between facets as light that is looked up is.
+        // Spread rays lose light between facets, as lookups do.
         let rough = if self.by_rays { 1.0 } else { looked_up };
         let (scale, bias) = around.shares;
         let (dielectric, metal) = (self.f0 * scale + self.f90 * bias, self.metal_f0 * scale + bias);
@@ -436,12 +436,12 @@ impl MetalRoughBsdf {
         (diffuse * around.diffuse + mirrored + again, taken)
     }
 
-    /// Its albedo by N·V, where it has no grain.
+    /// Albedo by N·V, where it has no grain.
     pub(crate) fn shares(&self) -> AlbedoRow {
         AlbedoRow::of(self.roughness)
     }
 
-    /// What comes of light that its facets send to each other, by the mean albedo of its lobe.
+    /// Light that its facets reflect to each other, for the mean albedo of its lobe.
     #[inline(always)]
     pub(crate) fn rebound(&self, mean_albedo: f32) -> Vec3 {
         rebound(mean_albedo, self.metal_f0)
@@ -452,12 +452,12 @@ impl MetalRoughBsdf {
         self.roughness
     }
 
-    /// This material where an occlusion map leaves everything open, as without one.
+    /// This material without occlusion.
     pub(crate) fn in_the_open(&self) -> Self {
         Self { occlusion: 1.0, ..*self }
     }
 
-    /// Weights of the mirror ray and of the ray that passes through, as seen from outside or not.
+    /// Weights of the mirror ray and of the transmitted ray, seen from outside or not.
     pub(super) fn bounce_weights(&self, cosine: f32, crossing: &Crossing, outside: bool) -> BounceWeights {
         let (mut dielectric, metal) = self.fresnel(cosine);
         let mut open = 1.0 - dielectric.max_element();
@@ -467,7 +467,7 @@ impl MetalRoughBsdf {
             let share = fresnel_dielectric(f64::from(cosine), f64::from(crossing.n_i), f64::from(crossing.n_t));
             #[expect(clippy::cast_possible_truncation, reason = "a share of light")]
             let share = share as f32;
-            // Inside, what is turned back belongs to the light that was let in.
+            // From inside, light turned back belongs to the transmitted light.
             if inside {
                 dielectric = Vec3::splat(share);
             } else if !self.filmed {
@@ -482,8 +482,8 @@ impl MetalRoughBsdf {
         }
     }
 
-    /// What is mirrored of light on clear glass of which Fresnel's equations mirror so much: with the strength and colour that
-    /// the material gives it face on, as far as it is not grazing.
+    /// Reflectance of clear glass for the Fresnel `share`: with the strength and colour that the material has at normal
+    /// incidence, fading towards grazing angles.
     fn tinted(&self, share: f32, crossing: &Crossing) -> Vec3 {
         let square = |a: f32, b: f32| ((a - b) / (a + b)).powi(2);
         let tint = self.f0 - Vec3::splat(square(self.ior, 1.0) * self.f90);
@@ -497,48 +497,48 @@ impl MetalRoughBsdf {
         dielectric.lerp(metal, self.metallic) * self.traced(outside)
     }
 
-    /// The weight of the mirror ray of what lets no light in.
+    /// Weight of the mirror ray of an opaque material.
     #[inline(always)]
     pub(crate) fn reflected(&self, cosine: f32) -> Vec3 {
         let (dielectric, metal) = self.fresnel(cosine);
         self.mirrored(dielectric, metal, true)
     }
 
-    /// Whether light passes through it here.
+    /// Whether light can pass through it here.
     pub(super) fn lets_light_in(&self) -> bool {
         self.transmission > 0.0 && self.metallic < 1.0
     }
 
-    /// What passes through of the light along one direction when `open` of it enters.
+    /// Transmitted light along one direction when the share `open` enters.
     fn passed(&self, open: f32) -> Vec3 {
         self.base * (self.transmission * (1.0 - self.metallic) * open.max(0.0))
     }
 
-    /// Share of the mirrored surroundings that a ray brings in. From inside there is no environment to look up.
+    /// Share of the mirrored environment that a ray brings in. From inside there is no environment to look up.
     #[inline(always)]
     fn traced(&self, outside: bool) -> f32 {
         if outside && !self.by_rays { traced(self.roughness.max(self.roughness_along)) } else { 1.0 }
     }
 
-    /// Share of the light passing through that is looked up instead.
+    /// Share of the transmitted light that is looked up instead.
     fn frosted(&self, outside: bool) -> f32 {
         if self.transmission <= 0.0 || !outside || self.by_rays {
             return 0.0;
         }
-        // What hardly bends light hardly spreads it.
+        // Glass that hardly refracts hardly spreads light.
         let bending = if self.thick { (2.0 * self.ior - 2.0).clamp(0.0, 1.0) } else { 1.0 };
         FROSTED_SHARE * smoothstep(0.0, FROSTED_ROUGHNESS, self.roughness * bending)
     }
 }
 
-/// Share of the mirrored surroundings that a ray brings in.
+/// Share of the mirrored environment that a ray brings in.
 #[inline(always)]
 pub(super) fn traced(roughness: f32) -> f32 {
     1.0 - smoothstep(MIRROR_ROUGHNESS, MATT_ROUGHNESS, roughness)
 }
 
-/// Share of the mirrored surroundings that the occlusion map leaves open: less where few directions are open and the
-/// lobe is wide (S. Lagarde, C. de Rousiers, "Moving Frostbite to Physically Based Rendering", 2014).
+/// Share of the mirrored environment that the occlusion map leaves open: less where few directions are open and the lobe is wide
+/// (S. Lagarde, C. de Rousiers, "Moving Frostbite to Physically Based Rendering", 2014).
 #[inline(always)]
 pub(crate) fn open(n_v: f32, occlusion: f32, roughness: f32) -> f32 {
     let share = (root(n_v + occlusion, exp2(-16.0 * roughness - 1.0)) - 1.0 + occlusion).clamp(0.0, 1.0);

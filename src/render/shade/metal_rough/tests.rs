@@ -60,7 +60,7 @@ fn the_tabulated_albedo_is_that_of_the_lobe() {
 
 #[test]
 fn no_more_light_leaves_than_arrives() {
-    // Nearer to grazing the model itself gives off a little too much.
+    // At more grazing angles the model itself reflects slightly too much.
     for roughness in [0.2, 0.5, 1.0] {
         for degrees in [0.0, 30.0, 50.0] {
             let white = MetalRoughBsdf { base: Vec3::ONE, roughness, ..bsdf() };
