@@ -1,22 +1,22 @@
-//! Lights with an extent at the points of a batch: of each light every point draws as many of its places as its ray is worth,
-//! and all points look at their first ones together, then at their second ones.
+//! Area lights at the points of a batch: for each light every point draws as many samples as its ray is worth; all points
+//! evaluate their first samples together, then their second ones.
 
 use super::columns::{Column, Columns, POINTS, ShadingBatch};
 use crate::render::draws::SampleSet;
 
-/// What each point draws of one light.
+/// Samples that each point draws on one light.
 pub(super) struct Drawn {
-    /// Whether points draw [`SampleSet::Part`] (from `keys` and `firsts`) or [`SampleSet::Moved`] (from `shifts`): the same
-    /// for all points of a picture.
+    /// Whether points draw [`SampleSet::Part`] (from `keys` and `firsts`) or [`SampleSet::Moved`] (from `shifts`): the same for
+    /// all points of a picture.
     is_sequence: bool,
     keys: [u32; POINTS],
     firsts: [u32; POINTS],
     shifts: [Column; 2],
-    /// How many places of it; 0 where the point is not shaded here.
+    /// Number of samples of each point; 0 where the point is not shaded here.
     counts: [u32; POINTS],
-    /// What part of the light one of them stands for.
+    /// Fraction of the light that one sample stands for.
     parts: Column,
-    /// Where shadow rays end, if that is anywhere.
+    /// Ends of the shadow rays, unless the light is at infinity.
     pub ends: Columns,
 }
 
@@ -29,7 +29,7 @@ impl Default for Drawn {
 }
 
 impl Drawn {
-    /// Whether point `i` draws a `k`th place.
+    /// Whether point `i` draws a `k`th sample.
     #[inline(always)]
     pub(super) fn has(&self, i: usize, k: u32) -> bool {
         k < self.counts[i]
@@ -40,11 +40,11 @@ impl Drawn {
         self.parts[i]
     }
 
-    /// Numbers of the `k`th place of each point.
+    /// Random numbers of the `k`th sample of each point.
     #[inline(always)]
     pub(super) fn places(&self, k: u32, points: usize) -> [Column; 2] {
         let (mut x, mut y) = ([0.0; POINTS], [0.0; POINTS]);
-        // The way is known outside the loop, which then is a formula.
+        // The kind is matched outside the loop, which is then branch-free.
         if self.is_sequence {
             (0..points.min(POINTS)).for_each(|i| [x[i], y[i]] = self.part_of_sequence(i).point(k));
         } else {
@@ -65,7 +65,8 @@ impl Drawn {
 }
 
 impl ShadingBatch {
-    /// Has points, told by number, draw so many places of a light each from their numbers, and the others none; the most of any.
+    /// Sets the sample set and the number of samples of these points, given by index, and 0 for all others; returns the largest
+    /// number.
     pub(crate) fn draw(&mut self, points: impl Iterator<Item = (usize, SampleSet, u32)>) -> u32 {
         let drawn = &mut self.drawn;
         drawn.counts = [0; POINTS];
@@ -85,7 +86,7 @@ impl ShadingBatch {
         most
     }
 
-    /// The numbers of the `k`th place that point `i` draws.
+    /// Random numbers of the `k`th sample of point `i`.
     pub(crate) fn drawn(&self, i: usize, k: u32) -> [f32; 2] {
         let drawn = &self.drawn;
         if drawn.is_sequence { drawn.part_of_sequence(i).point(k) } else { drawn.moved(i).point(k) }

@@ -1,5 +1,5 @@
-//! Points of a batch one by one, for what no column knows: rays that go on through glass and off several lobes, rays to the
-//! surroundings, and what layers of a picture tell.
+//! Single points of a batch, for data not held in columns: rays that go on through glass and off several lobes, rays to the
+//! environment, and the layers of a picture.
 
 use super::columns::{ShadingBatch, get, leave};
 use crate::accel::{NO_PRIM, Ray};
@@ -10,7 +10,7 @@ use crate::render::layers::FirstSurface;
 use crate::render::shade::{Bsdf, ShadingFrame};
 use crate::scene::Material;
 
-/// One of the points, as rays that go on ask for it.
+/// One of the points, for rays that go on from it.
 pub(crate) struct BatchPoint<'a> {
     batch: &'a ShadingBatch,
     i: usize,
@@ -20,19 +20,19 @@ pub(crate) struct BatchPoint<'a> {
 }
 
 impl ShadingBatch {
-    /// The points that are shaded here.
+    /// Points that are shaded here.
     pub(crate) fn certain(&self) -> impl Iterator<Item = usize> {
         (0..self.count).filter(|&i| self.found.certain[i] == 1)
     }
 
-    /// The place in what was traced of the ray that came to point `i`, its weight there, and the width of its cone.
+    /// Index of the traced ray that hit point `i`, its weight there, and the width of its cone.
     pub(crate) fn arrival(&self, i: usize) -> (usize, Vec3, f32) {
         let weight = self.weights.as_ref().map_or(Vec3::ONE, |weights| get(weights, i));
         (self.rays[i] as usize, weight, self.cones.width[i])
     }
 
-    /// Of each point that is shaded here: the place in what was traced of its ray, its sample, and what layers of a
-    /// picture tell of it, whose material is `unmapped` but for maps.
+    /// For each point that is shaded here: the index of its traced ray, its sample, and its data for the picture's layers;
+    /// `unmapped` is the material without maps.
     pub(crate) fn firsts(
         &self,
         instance: u32,
@@ -47,7 +47,7 @@ impl ShadingBatch {
         })
     }
 
-    /// The material at point `i`, which is `unmapped` where maps do not change it, but for its lobes.
+    /// Material at point `i` without its overlays; `unmapped` is the material without maps.
     pub(super) fn base_bsdf(&self, i: usize, unmapped: &Bsdf, outside: bool) -> Bsdf {
         if self.painted.any {
             return Bsdf::base_layer(self.painted.model(i, &unmapped.model), self.painted.emission(i), outside);
@@ -55,14 +55,14 @@ impl ShadingBatch {
         Bsdf::base_layer(unmapped.model, unmapped.emission, outside)
     }
 
-    /// Point `i` of this material, by number too, the back of which is seen from inside if it `has_inside`.
+    /// Point `i` of this material, given with its index; its back is seen from inside if the material `has_inside`.
     pub(crate) fn point<'a>(&'a self, i: usize, material: (u32, &'a Material), has_inside: bool) -> BatchPoint<'a> {
         BatchPoint { batch: self, i, material, outside: self.found.front[i] == 1 || !has_inside }
     }
 }
 
 impl BatchPoint<'_> {
-    /// The material there, which is `unmapped` where maps do not change it, under what lies over it.
+    /// Material at the point with its overlays; `unmapped` is the material without maps.
     pub(crate) fn bsdf(&self, unmapped: &Bsdf) -> Bsdf {
         let base_bsdf = self.batch.base_bsdf(self.i, unmapped, self.outside);
         match self.batch.overlays.as_ref().filter(|over| over.any()) {

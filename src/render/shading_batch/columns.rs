@@ -1,4 +1,4 @@
-//! Points by number and place: what is known of them, and the surface that is found from it.
+//! The points of a batch as columns: data of the hits, and the surface computed from them.
 
 use super::area_lights::Drawn;
 use super::cones::Cones;
@@ -22,18 +22,18 @@ use crate::render::texture::Places;
 use crate::render::world::Placement;
 use std::ops::{Add, Mul};
 
-/// Points of a batch at most.
+/// Maximum number of points of a batch.
 pub(crate) const POINTS: usize = 64;
 
 pub(super) use crate::math::simd::LANES;
 
-/// One number of every point.
+/// One value of every point.
 pub(super) type Column = [f32; POINTS];
 
-/// Three numbers of every point.
+/// Three values of every point.
 pub(super) type Columns = [Column; 3];
 
-/// A place or direction of every point.
+/// Position or direction of point `i`.
 #[inline(always)]
 pub(super) fn get(columns: &Columns, i: usize) -> Vec3 {
     Vec3::new(columns[0][i], columns[1][i], columns[2][i])
@@ -46,63 +46,63 @@ pub(super) fn put(columns: &mut Columns, i: usize, v: Vec3) {
     columns[2][i] = v.z;
 }
 
-/// Where a ray from point `i` in this direction starts.
+/// Origin of a ray from point `i` in this direction.
 #[inline(always)]
 pub(super) fn leave(found: &Found, i: usize, dir: Vec3) -> Vec3 {
     offset_origin(get(&found.position, i), get(&found.error, i), get(&found.geometric, i), dir)
 }
 
-/// Points of one instance. Columns lie in whole cache lines.
+/// Points of one instance. Columns fill whole cache lines.
 #[repr(C, align(64))]
 pub(crate) struct ShadingBatch {
     pub(super) count: usize,
     pub(super) level: Level,
-    /// The place of each point's ray in its wave.
+    /// Index of each point's ray in its wave.
     pub(super) rays: [u32; POINTS],
-    /// The sample of each point.
+    /// Sample of each point.
     pub(super) samples: [u32; POINTS],
-    /// The weight of each point; `None` where all are 1.
+    /// Weight of each point; `None` where all are 1.
     pub(super) weights: Option<Columns>,
     pub(super) given: Given,
     pub(super) found: Found,
     pub(super) painted: Painted,
-    /// Texels of maps of lobes, where they are read side by side.
+    /// Texels of the maps of lobes, where they are read side by side.
     pub(super) of_lobes: Box<LobeTexels>,
     pub(super) cones: Cones,
     pub(super) places: Places,
     pub(super) surroundings: Surroundings,
     pub(super) lit: Lit,
     pub(super) drawn: Drawn,
-    /// The whole BSDF of each point, where more changes it than columns know; else empty.
+    /// Whole BSDF of each point, where columns cannot describe it; else empty.
     pub(super) point_bsdfs: Vec<Bsdf>,
-    /// What lies over each point, where that is all there is more; kept from one batch to the next.
+    /// Overlays of each point, where they are the only further lobes; the allocation is kept between batches.
     pub(super) overlays: Option<Box<Overlays>>,
 }
 
-/// What hits say.
+/// Data of the hits.
 #[repr(C, align(64))]
 pub(super) struct Given {
     origin: Columns,
     dir: Columns,
-    /// The weights of the second and third corner.
+    /// Barycentric coordinates of the second and third corner.
     weights: [Column; 2],
     pub faces: Faces,
 }
 
-/// The surface at each point.
+/// Surface at each point.
 #[repr(C, align(64))]
 pub(super) struct Found {
-    /// 1 where that is all, 0 where the tracer must look itself.
+    /// 1 where this suffices, 0 where the tracer must shade the point itself.
     pub certain: [u32; POINTS],
     /// 1 where the front is seen.
     pub front: [u32; POINTS],
-    /// 1 where the mesh stands for something round.
+    /// 1 where the mesh stands for a round surface.
     pub curved: [u32; POINTS],
     pub position: Columns,
     pub error: Columns,
     pub view: Columns,
     pub geometric: Columns,
-    /// Of the plane that lights must be above: where the mesh stands for something round, not that of the triangle.
+    /// Normal of the plane that lights must be above: where the mesh stands for a round surface, not that of the triangle.
     pub horizon: Columns,
     pub normal: Columns,
 }
@@ -145,8 +145,8 @@ impl Default for ShadingBatch {
 }
 
 impl ShadingBatch {
-    /// Takes hits, at most [`POINTS`], each by the place of its ray in what was traced and that of its face, with the
-    /// normals of its corners if the mesh is `smooth`. What absorbs light on the way lessens the weights of their rays.
+    /// Takes hits, at most [`POINTS`], each as the index of its ray in the traced ones and that of its face, with the normals of
+    /// its corners if the mesh is `smooth`. Absorption on the way reduces the weights of the rays.
     pub(crate) fn take(
         &mut self,
         hit: &[(u32, u32)],
@@ -178,7 +178,7 @@ impl ShadingBatch {
         self.level.run(Gather { given: &mut self.given, hit: &hit[..self.count], sorted, traced, smooth });
     }
 
-    /// Finds the surface at each point; `placement` where the mesh has normals of its own.
+    /// Computes the surface at each point; `placement` is given where the mesh has vertex normals.
     pub(crate) fn find(&mut self, placement: Option<&Placement>) {
         let points = padded(self.count);
         let (given, found) = (&self.given, &mut self.found);
@@ -189,19 +189,19 @@ impl ShadingBatch {
         }
     }
 
-    /// Leaves out the points whose rays, by their places in what was traced, are not wanted.
+    /// Drops the points whose rays, given by index, are not wanted.
     pub(crate) fn retain(&mut self, wanted: impl Fn(usize) -> bool) {
         for (certain, &ray) in self.found.certain.iter_mut().zip(&self.rays).take(self.count) {
             *certain &= u32::from(wanted(ray as usize));
         }
     }
 
-    /// Whether backs of faces are all that is seen.
+    /// Whether all points show the backs of their faces.
     pub(crate) fn sees_backs_alone(&self) -> bool {
         self.certain().all(|i| self.found.front[i] == 0)
     }
 
-    /// The rays whose points must be shaded one by one: those that are not certain.
+    /// Rays whose points must be shaded one by one: those that are not certain.
     pub(crate) fn left_out(&self) -> impl Iterator<Item = u32> {
         let certain = &self.found.certain[..self.count.min(POINTS)];
         // Hardly ever any.
@@ -211,7 +211,7 @@ impl ShadingBatch {
     }
 }
 
-/// The number of points that are computed: whole registers.
+/// Number of points that are computed: whole SIMD registers.
 #[inline(always)]
 pub(super) fn padded(count: usize) -> usize {
     count.next_multiple_of(LANES).min(POINTS)
@@ -303,7 +303,7 @@ impl Kernel for Smooth<'_> {
         }
         for i in 0..points.min(POINTS) {
             given.turn(found, i);
-            // Not all at once, which would be a call.
+            // Not all at once, which would compile to a call.
             found.curved[i] = given.faces.curved(i);
             found.shade(i, given.own_normal(&placement, i));
         }
@@ -312,7 +312,7 @@ impl Kernel for Smooth<'_> {
 }
 
 impl Given {
-    /// Position and error.
+    /// Computes position and error bound.
     #[inline(always)]
     fn place(&self, found: &mut Found, i: usize) {
         let plane = self.faces.plane(i);
@@ -323,27 +323,27 @@ impl Given {
         found.certain[i] = u32::from(certain);
     }
 
-    /// The weights of the corners.
+    /// Barycentric coordinates of all corners.
     #[inline(always)]
     pub(super) fn corner_weights(&self, i: usize) -> [f32; 3] {
         let (u, v) = (self.weights[0][i], self.weights[1][i]);
         [1.0 - u - v, u, v]
     }
 
-    /// What the corners have, mixed by their weights.
+    /// Interpolates an attribute of the corners.
     #[inline(always)]
     pub(super) fn mix<T: Mul<f32, Output = T> + Add<Output = T>>(&self, i: usize, [a, b, c]: [T; 3]) -> T {
         let [wa, wb, wc] = self.corner_weights(i);
         a * wa + b * wb + c * wc
     }
 
-    /// The mesh's own normal, of unit length.
+    /// Interpolated vertex normal, of unit length.
     #[inline(always)]
     pub(super) fn own_normal(&self, placement: &Placement, i: usize) -> Vec3 {
         smooth_normal(placement, self.mix(i, self.faces.normals(i))).unwrap_or(self.faces.outward(i))
     }
 
-    /// Which side is seen, and from where.
+    /// Computes the view direction and the visible side.
     #[inline(always)]
     fn turn(&self, found: &mut Found, i: usize) {
         let view = -get(&self.dir, i).try_normalize().unwrap_or(Vec3::Z);
@@ -356,7 +356,7 @@ impl Given {
 }
 
 impl Found {
-    /// How point `i` is seen.
+    /// View and normals of point `i` for shading.
     #[inline(always)]
     pub(super) fn seen(&self, i: usize) -> ShadingFrame {
         ShadingFrame {
@@ -367,7 +367,7 @@ impl Found {
         }
     }
 
-    /// The shading normal, from the mesh's own, as it is before [`Self::turn_to_view`].
+    /// Sets the shading normal, from the mesh's own, as it is before [`Self::turn_to_view`].
     #[inline(always)]
     fn shade(&mut self, i: usize, own: Vec3) {
         let geometric = get(&self.geometric, i);
@@ -376,7 +376,7 @@ impl Found {
         put(&mut self.horizon, i, if self.curved[i] == 1 { normal } else { geometric });
     }
 
-    /// Turns normals so far that their fronts are seen, which hardly any need.
+    /// Turns normals to face the viewer, which hardly any need.
     #[inline(always)]
     fn turn_to_view(&mut self, points: usize) {
         let mut any = 0;
@@ -482,7 +482,7 @@ mod tests {
             Face::of_triangle(prim, &corners, Some([(); 3].map(|()| random.direction())))
         };
         let sorted = HitsByInstance::of_faces((0..20).map(face).collect());
-        // Faces that one point shows, or some, or more than are written at once.
+        // Faces hit by one point, by some, or by more than are written at once.
         let lengths = [1, 2, 9, 1, 17, 8, 3, 23];
         let seen = (0u32..).step_by(2).zip(lengths).flat_map(|(face, length)| std::iter::repeat_n(face, length));
         let hit: Vec<(u32, u32)> = (0..100).rev().zip(seen).collect();
@@ -508,7 +508,7 @@ mod tests {
     #[test]
     fn every_instruction_set_finds_the_same_surfaces_and_light() {
         let turned = Placement::new(DMat3::from_rotation_y(0.4) * DMat3::from_diagonal(DVec3::new(1.0, 2.0, 0.5)));
-        // One place of the light, or one that each point draws.
+        // A light with a single sample, or with one drawn by each point.
         for (placement, size) in [(None, 0.0), (Some(&turned), 0.0), (Some(&turned), 0.7)] {
             let plain = found(Level::PORTABLE, placement, size);
             let count = |k: usize| plain.iter().filter(|p| p[k] == 1).count();

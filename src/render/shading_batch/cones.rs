@@ -1,5 +1,5 @@
-//! What a ray's cone covers at each point of a batch, and how far the surface bends in it: how wide narrow highlights must
-//! be, and what the surface mirrors.
+//! Footprints of ray cones at the points of a batch, and the curvature of the surface within: they determine the width of narrow
+//! highlights, and the cones of mirror rays.
 
 use super::columns::{Column, Columns, Found, Given, POINTS, ShadingBatch, get, leave, padded, put};
 use super::constants::MaterialConstants;
@@ -15,26 +15,26 @@ use crate::render::shade_hits::TracedRays;
 use crate::render::wave::{Path, Queue, RayClass};
 use crate::render::world::Placement;
 
-/// The cones.
+/// Cones of the rays, by point.
 pub(crate) struct Cones {
     /// Width at the point, and growth.
     pub(super) width: Column,
     pub(super) spread: Column,
-    /// Axes of the ellipse in which the cone meets the surface.
+    /// Axes of the ellipse where the cone meets the surface.
     along: Columns,
     across: Columns,
-    /// Squares of the angles by which the mesh's own normal turns along both axes, summed, …
+    /// Squared angles by which the mesh's own normal turns along both axes, summed, …
     pub(super) bend: Column,
-    /// … and of those by which a normal map turns it in reach.
+    /// … and of those by which a normal map turns it within reach.
     pub(super) turning: Column,
-    /// α² of the highlights of lights at least.
+    /// Lower bound of α² in highlights of lights.
     pub(super) least_square: Column,
     mirrored: Mirrored,
 }
 
-/// The rays that find what is mirrored.
+/// Mirror rays.
 struct Mirrored {
-    /// 1 where it can be seen.
+    /// 1 where the mirror ray is sent.
     alive: [u32; POINTS],
     weight: Columns,
     origin: Columns,
@@ -42,7 +42,7 @@ struct Mirrored {
     spread: Column,
 }
 
-/// The weights of eye rays.
+/// Weights of eye rays.
 pub(super) const ONES: Columns = [[1.0; POINTS]; 3];
 
 impl Default for Cones {
@@ -63,7 +63,7 @@ impl Default for Cones {
 }
 
 impl Cones {
-    /// What a cone covers at point `i`.
+    /// Footprint of the cone at point `i`.
     #[inline(always)]
     pub(super) fn footprint(&self, i: usize) -> Footprint {
         Footprint { along: get(&self.along, i), across: get(&self.across, i) }
@@ -71,7 +71,7 @@ impl Cones {
 }
 
 impl ShadingBatch {
-    /// Finds what the cones of the rays cover.
+    /// Computes the footprints of the rays' cones.
     pub(crate) fn widen(&mut self, traced: TracedRays) {
         let count = self.count.min(POINTS);
         let Self { cones, found, rays, .. } = self;
@@ -83,8 +83,8 @@ impl ShadingBatch {
         self.level.run(Print { found, cones, points: padded(count) });
     }
 
-    /// Finds how far a surface bends where cones meet it, and how wide highlights must be, unless that is found when points are
-    /// completed; `placement` where the mesh has normals of its own.
+    /// Computes the curvature of the surface within the cones, and the width of highlights, unless that is done when points are
+    /// completed; `placement` is given where the mesh has vertex normals.
     pub(crate) fn bend(&mut self, context: &Context, constants: &MaterialConstants, placement: Option<&Placement>) {
         let bsdf = &constants.bsdf;
         let Self { cones, painted, given, found, .. } = self;
@@ -98,7 +98,7 @@ impl ShadingBatch {
         }
     }
 
-    /// Sends the rays that find what a surface of `bsdf` mirrors.
+    /// Queues the mirror rays of a surface of `bsdf`.
     pub(crate) fn mirror(
         &mut self,
         context: &Context,
@@ -250,8 +250,8 @@ impl Kernel for Mirror<'_> {
     }
 }
 
-/// The rays of points that mirror such shares of light where the cosine of the view is so; they follow rays of these
-/// weights, and may be sent above the cutoff.
+/// Computes mirror rays of points that reflect `share` at the cosine of the view; they follow rays with these weights, and are
+/// sent if above the cutoff.
 #[inline(always)]
 fn mirror(
     found: &Found,

@@ -1,4 +1,4 @@
-//! What all points of a material have in common.
+//! Data shared by all points of a material.
 
 use super::material_maps::MaterialMaps;
 use crate::render::context::Gloss;
@@ -6,32 +6,32 @@ use crate::render::shade::{Bsdf, Model, has_inside};
 use crate::render::texture::TextureStore;
 use crate::scene::{Material, MetalRough};
 
-/// What is known of a material for all points of it.
+/// Data of a material that is the same at all its points.
 pub(crate) struct MaterialConstants {
-    /// Its number.
+    /// Index of the material.
     pub material: u32,
-    /// As it is where its maps are white.
+    /// The material where all maps are white.
     pub bsdf: Bsdf,
-    /// Whether backs of faces are passed.
+    /// Whether rays pass backs of faces.
     pub one_sided: bool,
-    /// How much is seen of it where neither maps nor vertices say.
+    /// Opacity without maps and vertex colours.
     pub coverage: f32,
-    /// Whether maps change it from point to point.
+    /// Whether it has maps.
     pub mapped: bool,
-    /// Those maps and the colours of vertices, where they can be read side by side.
+    /// These maps and the vertex colours, where they can be read side by side.
     pub material_maps: Option<MaterialMaps>,
-    /// Whether cones and how they bend must be known: it may mirror, where rays bounce, or show lights as narrow highlights, or
-    /// has lobes that may.
+    /// Whether footprints and curvature are needed: it may mirror, where rays bounce, or have narrow highlights, or lobes that
+    /// may.
     pub needs_cones: bool,
-    /// Where light enters it, which rays follow.
+    /// Data of a transmitting material, whose refracted rays are followed.
     pub glass: Option<Glass>,
-    /// What each point has over it, or reads for itself.
+    /// Further lobes, or maps read point by point.
     pub lobes: Option<Lobes>,
-    /// Whether all that it mirrors and lets through is seen by rays, where any may go on.
+    /// Whether reflection and transmission are seen by rays alone, and rays may go on.
     pub spreads: bool,
 }
 
-/// What is known of a material whose points have more lobes than that of their facets, or maps of their reflectance.
+/// Data of a material with lobes beyond its microfacets, or maps of its reflectance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lobes {
     /// Whether the mesh around a point must be known, …
@@ -40,21 +40,21 @@ pub(crate) struct Lobes {
     pub reads_maps: bool,
     /// Whether maps say how much it reflects.
     pub reads_reflectance: bool,
-    /// Whether they are sheen and clear coat alone, which leave what is under them as it is.
+    /// Whether the lobes are sheen and clear coat alone, which do not change the layers below.
     pub are_overlays: bool,
 }
 
-/// What is known of a material that lets light in.
+/// Data of a transmitting material.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Glass {
     /// Whether backs of faces are seen from inside.
     pub has_inside: bool,
-    /// Whether nothing of its surface is seen from inside but what rays find that go on.
+    /// Whether the surface itself shows no light from inside, only what its secondary rays find.
     pub is_dark_inside: bool,
 }
 
 impl MaterialConstants {
-    /// `None` for what lets light in, unless it is metallic-rough and rays go through it without being scattered on their way.
+    /// `None` for a transmitting material, unless it is metallic-rough and rays pass through it without being scattered inside.
     pub(crate) fn of(
         (number, material): (u32, &Material),
         store: &TextureStore,
@@ -93,12 +93,12 @@ impl MaterialConstants {
         })
     }
 
-    /// Whether rays that go on from it are found point by point.
+    /// Whether its secondary rays are computed point by point.
     pub(crate) fn sends_by_points(&self) -> bool {
         self.glass.is_some() || self.lobes.is_some() || self.spreads
     }
 
-    /// Whether what its points are made of is found point by point.
+    /// Whether its BSDF is computed point by point.
     pub(crate) fn is_completed(&self) -> bool {
         self.lobes.is_some_and(|lobes| !lobes.are_overlays)
     }
@@ -135,18 +135,18 @@ impl Glass {
     }
 }
 
-/// Whether light that was let in may be scattered from inside: what is left for that is found for each point.
+/// Whether transmitted light may be scattered from inside: its share is computed point by point.
 fn scatters_inside(m: &MetalRough) -> bool {
     m.thick && (m.transmission < 1.0 || m.transmission_map.is_some())
 }
 
-/// Whether maps say how much it reflects.
+/// Whether it has maps of its reflectance.
 pub(super) fn reads_reflectance(m: &MetalRough) -> bool {
     m.specular_map.is_some() || m.specular_color_map.is_some()
 }
 
-/// How many maps it has of more than its colour, roughness and metalness, and of what passes through: of its reflectance, and of
-/// lobes. How thick it is matters only where that is looked up.
+/// Number of its maps other than those of colour, roughness, metalness and transmission: of its reflectance, and of lobes.
+/// Thickness matters only where it is looked up, and does not count.
 pub(super) fn other_maps(m: &MetalRough) -> usize {
     let known = [&m.metal_rough_map, &m.transmission_map, &m.thickness_map];
     m.maps().count() - known.into_iter().flatten().count()

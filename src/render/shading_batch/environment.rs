@@ -1,4 +1,4 @@
-//! What the points of a batch show of their surroundings, and what they shine with themselves.
+//! Environment light that the points of a batch reflect, and the light they emit.
 
 use super::columns::{Column, Columns, Found, POINTS, ShadingBatch, get, padded, put};
 use super::overlays::Overlays;
@@ -12,23 +12,23 @@ use crate::render::sky::Sky;
 use crate::render::studio;
 use crate::scene::UpAxis;
 
-/// Light from everywhere: of the sky, and without direction.
+/// Environment light: of the sky, and the ambient term.
 #[derive(Clone, Copy)]
 pub(super) struct EnvironmentLight<'a> {
     pub sky: &'a Sky,
     pub ambient: Vec3,
 }
 
-/// The surroundings as each point sees them.
+/// Environment light at each point.
 pub(super) struct Surroundings {
     /// Cosine of the view, and the shares of f0 and f90 there.
     n_v: Column,
     shares: [Column; 2],
-    /// Mean of both over the hemisphere.
+    /// Mean albedo over the hemisphere.
     mean: Column,
-    /// Share of the mirrored surroundings that nothing stands in the way of.
+    /// Unoccluded share of the mirrored light.
     open: Column,
-    /// Where that is looked for, in the studio.
+    /// Directions of the mirrored lookups, in the studio.
     mirrored_dir: Columns,
     diffuse: Columns,
     mirrored: Columns,
@@ -52,8 +52,8 @@ impl Default for Surroundings {
 }
 
 impl ShadingBatch {
-    /// Finds what each point of a surface of `bsdf` shows of `sky` and of light from everywhere; backs of what `has_inside` are
-    /// seen from inside.
+    /// Computes the light of `sky` and ambient light reflected by each point of a surface of `bsdf`; if it `has_inside`, backs
+    /// are seen from inside.
     pub(crate) fn shade_environment(&mut self, (bsdf, has_inside): (&Bsdf, bool), sky: &Sky, ambient: Vec3) {
         let (found, painted, to, points) = (&self.found, &self.painted, &mut self.surroundings, padded(self.count));
         let overlays = self.overlays.as_deref_mut().filter(|over| over.any());
@@ -63,7 +63,7 @@ impl ShadingBatch {
         }
     }
 
-    /// The samples of the points, and what they show.
+    /// Samples of the points, with their radiance.
     pub(crate) fn shown(&self) -> impl Iterator<Item = (u32, Vec3)> {
         let (found, surroundings) = (&self.found, &self.surroundings);
         let certain = (0..self.count.min(POINTS)).filter(|&i| found.certain[i] == 1);
@@ -71,7 +71,7 @@ impl ShadingBatch {
     }
 }
 
-/// Makes of what points show what their samples see.
+/// Kernel that multiplies the radiance of points by the weights of their rays.
 pub(super) struct Weigh<'a> {
     pub weights: &'a Columns,
     pub radiance: &'a mut Columns,
@@ -105,7 +105,7 @@ struct Look<'a> {
 impl Kernel for Look<'_> {
     type Output = ();
 
-    // Whether maps change the material is asked outside the loops, which then are formulas.
+    // Whether maps change the material is tested outside the loops, which are then branch-free.
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let Self { found, painted, overlays, to, points, bsdf, has_inside, sky, ambient } = self;
@@ -151,7 +151,7 @@ impl Kernel for Look<'_> {
     }
 }
 
-/// What Phong's model shows of light from everywhere.
+/// Ambient and environment light reflected by Phong's model.
 #[inline(always)]
 fn scatter(to: &mut Surroundings, points: usize, ambient: Vec3, bsdf: impl Fn(usize) -> (Vec3, PhongBsdf)) {
     for i in 0..points.min(POINTS) {
@@ -163,15 +163,15 @@ fn scatter(to: &mut Surroundings, points: usize, ambient: Vec3, bsdf: impl Fn(us
 /// A metallic-rough material at each point.
 trait MetalRoughPoints {
     fn bsdf(&self, i: usize) -> MetalRoughBsdf;
-    /// Finds the shares of f0 and f90 in what its lobe sends back where the cosines of the view are these.
+    /// Computes the shares of f0 and f90 in the lobe's albedo at these cosines of the view.
     fn find_shares<S: Simd>(&self, s: S, points: usize, n_v: &Column, to: &mut [Column; 2]);
-    /// Finds the means over the hemisphere of what white lobes send back, where they differ.
+    /// Computes the mean albedos of white lobes over the hemisphere, where they differ by point.
     fn find_means(&self, points: usize, means: &mut Column);
-    /// The mean albedo at a point.
+    /// Mean albedo at a point.
     fn mean_albedo(&self, means: &Column, i: usize) -> f32;
-    /// Share of the mirrored surroundings that nothing stands in the way of.
+    /// Unoccluded share of the mirrored light.
     fn open(&self, i: usize, n_v: f32) -> f32;
-    /// Whether what is mirrored is looked up.
+    /// Whether mirrored light is looked up.
     fn looks_up(&self) -> bool;
 }
 
@@ -215,7 +215,7 @@ impl MetalRoughPoints for Even {
     }
 }
 
-/// As maps say.
+/// A material changed by maps.
 struct Mapped<'a> {
     m: MetalRoughBsdf,
     painted: &'a Painted,
@@ -259,7 +259,8 @@ impl MetalRoughPoints for Mapped<'_> {
     }
 }
 
-/// What a metallic-rough material shows, with its emission; `outside` tells whether a point is seen from outside.
+/// Computes the environment light of a metallic-rough material, plus emission; `outside` returns whether a point is seen from
+/// outside.
 #[inline(always)]
 fn look<S: Simd>(
     s: S,
@@ -298,7 +299,7 @@ fn look<S: Simd>(
             mirrored: get(&to.mirrored, i) + ambient,
             open: to.open[i],
             outside: outside(i),
-            // What scatters inside of itself has no batches.
+            // Materials that scatter light inside are not batched.
             turned_back: 0.0,
         };
         let bsdf = m.bsdf(i);
@@ -306,7 +307,7 @@ fn look<S: Simd>(
     }
 }
 
-/// Mean light over the hemispheres around these normals.
+/// Mean radiance over the hemispheres around these normals.
 #[inline(always)]
 fn spread(sky: &Sky, normals: &Columns, points: usize, to: &mut Columns) {
     match sky.studio() {
@@ -324,7 +325,7 @@ fn spread(sky: &Sky, normals: &Columns, points: usize, to: &mut Columns) {
     }
 }
 
-/// Mean light around these mirrored directions, as far as the roughness says.
+/// Mean radiance around these mirrored directions, blurred by the roughness.
 #[inline(always)]
 pub(super) fn blur(sky: &Sky, roughness: impl Fn(usize) -> f32, dirs: &Columns, points: usize, to: &mut Columns) {
     match sky.studio() {
@@ -342,7 +343,7 @@ pub(super) fn blur(sky: &Sky, roughness: impl Fn(usize) -> f32, dirs: &Columns, 
     }
 }
 
-/// One radiance for every point: such surroundings look alike in all directions.
+/// Sets one radiance for all points: such environments look alike in all directions.
 #[inline(always)]
 fn fill(to: &mut Columns, points: usize, radiance: Vec3) {
     (0..points.min(POINTS)).for_each(|i| put(to, i, radiance));

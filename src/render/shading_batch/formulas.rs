@@ -18,7 +18,7 @@ pub(super) trait PointBsdf {
 /// One BSDF at all points.
 pub(super) struct Uniform<B>(pub B);
 
-/// The BSDF of a material, with the numbers that maps and vertices give each point.
+/// The BSDF of a material, with the inputs that maps and vertices give each point.
 pub(super) struct Mapped<'a, B> {
     pub painted: &'a Painted,
     pub unmapped: B,
@@ -51,7 +51,7 @@ impl PointBsdf for Mapped<'_, MetalRoughBsdf> {
     }
 }
 
-/// What points reflect of a light.
+/// A reflection model, evaluated at each point.
 pub(super) trait Formula {
     /// BRDF × N·L at point `i`; unit vectors.
     fn reflected(&self, i: usize, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3;

@@ -1,4 +1,4 @@
-//! The hits of a wave by instance, each with its face; faces that are hit again are not looked up again.
+//! Hits of a wave by instance, each with its face; faces that are hit again are cached.
 
 use super::faces::{FaceNumbers, Skin};
 use super::material_maps::MaterialMaps;
@@ -10,10 +10,10 @@ use crate::render::patch::Gradients;
 use crate::render::world::PrimSource;
 use crate::scene::Mesh;
 
-/// Faces that are remembered: a block of pixels sees about as many.
+/// Number of cached faces: a block of pixels sees about as many.
 const REMEMBERED: usize = 256;
 
-/// No instance, which marks faces that must be shaded one by one; also no skin.
+/// Marks faces that have no instance, and are shaded one by one; also marks "no skin".
 const NONE: u32 = u32::MAX;
 
 /// A face that was hit.
@@ -21,7 +21,7 @@ const NONE: u32 = u32::MAX;
 pub(crate) struct Face {
     pub(super) numbers: FaceNumbers,
     instance: u32,
-    /// Its place among the skins; [`NONE`] if it has none.
+    /// Index among the skins; [`NONE`] if it has none.
     pub(super) skin: u32,
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct Face {
 pub(crate) struct HitsByInstance {
     faces: Vec<Face>,
     skins: Vec<Skin>,
-    /// The face of a prim, at the place that its number gives.
+    /// Cache of prims and their faces, addressed by the prim.
     remembered: Box<[(u32, u32); REMEMBERED]>,
     /// Ray and face of the hits of each instance.
     lists: Vec<Vec<(u32, u32)>>,
@@ -46,7 +46,7 @@ impl Default for HitsByInstance {
 }
 
 impl HitsByInstance {
-    /// Forgets all hits.
+    /// Drops all hits.
     pub(crate) fn clear(&mut self, instances: usize) {
         self.faces.clear();
         self.skins.clear();
@@ -57,7 +57,7 @@ impl HitsByInstance {
         }
     }
 
-    /// Takes the hits on one prim of so many rays that follow each other; false if they must be shaded one by one.
+    /// Adds the hits of `count` consecutive rays on one prim; false if they must be shaded one by one.
     #[inline(always)]
     pub(crate) fn take(&mut self, context: &Context, (first, count): (u32, usize), prim: u32) -> bool {
         let place = &mut self.remembered[prim as usize % REMEMBERED];
@@ -75,29 +75,29 @@ impl HitsByInstance {
         true
     }
 
-    /// The instances that were hit.
+    /// Number of instances that were hit.
     pub(crate) fn instances(&self) -> usize {
         self.hit.len()
     }
 
-    /// The `k`th instance that was hit, and the hits with it: rays, and faces among [`Self::faces`].
+    /// The `k`th instance that was hit, and its hits: rays, and faces among [`Self::faces`].
     pub(crate) fn of(&self, k: usize) -> (u32, &[(u32, u32)]) {
         let instance = self.hit[k];
         (instance, &self.lists[instance as usize])
     }
 
-    /// All that were hit.
+    /// All faces that were hit.
     pub(crate) fn faces(&self) -> &[Face] {
         &self.faces
     }
 
-    /// Faces of no hits.
+    /// These faces, without hits.
     #[cfg(test)]
     pub(super) fn of_faces(faces: Vec<Face>) -> Self {
         Self { faces, ..Self::default() }
     }
 
-    /// The skins of those that have one.
+    /// Skins of the faces that have one.
     pub(super) fn skins(&self) -> &[Skin] {
         &self.skins
     }
@@ -111,7 +111,7 @@ impl Face {
         Self::new(context, prim, skins).unwrap_or_else(|| Self { numbers: nothing(), instance: NONE, skin: NONE })
     }
 
-    /// `None` for what is no triangle with an area and a material that points have in common.
+    /// `None` unless it is a triangle with an area and a material with shared constants.
     fn new(context: &Context, prim: u32, skins: &mut Vec<Skin>) -> Option<Self> {
         let (scene, world) = (context.scene, context.world);
         let PrimSource::Triangle { instance, triangle: in_mesh } = world.source(prim) else { return None };
@@ -141,7 +141,7 @@ impl Face {
         Some(Self { numbers, instance, skin })
     }
 
-    /// A face of no instance.
+    /// A face without instance.
     #[cfg(test)]
     pub(super) fn of_triangle(
         prim: u32,
@@ -153,7 +153,7 @@ impl Face {
     }
 }
 
-/// The skin of a triangle of a mesh.
+/// Skin of a triangle of a mesh.
 fn skin_of(mesh: &Mesh, corners: [u32; 3], gradients: &Gradients, material_maps: Option<&MaterialMaps>) -> Skin {
     let uvs = |k: usize| {
         material_maps.map_or_else(Default::default, |material_maps| material_maps.coordinates(k, mesh, corners))

@@ -1,4 +1,4 @@
-//! The light that arrives at the points of a batch, and the shadow rays that ask whether it does.
+//! Direct light at the points of a batch, and the shadow rays that test it.
 
 use super::area_lights::Drawn;
 use super::columns::{Column, Columns, Found, LANES, POINTS, ShadingBatch, get, leave, padded, put};
@@ -18,19 +18,19 @@ use crate::render::shade_hits::TracedRays;
 use crate::render::shadow::curve::STEEP;
 use crate::render::shadow::{Bound, ShadowQueue};
 
-/// Light whose shadow ray starts on the triangle.
+/// Marks light whose shadow ray starts on the triangle.
 const PLAIN: u32 = 1;
 
-/// Light so flat that the shadow ray must be found by [`Surface`](crate::render::surface::Surface).
+/// Marks light at such a grazing angle that [`Surface`](crate::render::surface::Surface) must compute the shadow ray.
 const GRAZING: u32 = 2;
 
-/// What one light does at each point.
+/// Contribution of one light at each point.
 #[repr(C, align(64))]
 pub(super) struct Lit {
-    /// [`PLAIN`] or [`GRAZING`] where it is seen, else 0.
+    /// [`PLAIN`] or [`GRAZING`] where the light is seen, else 0.
     pub seen: [u32; POINTS],
     pub to_light: Columns,
-    /// Its strength, or irradiance, as the model wants it.
+    /// Its strength, or irradiance, depending on the model.
     pub light: Columns,
     pub radiance: Columns,
     /// The shadow ray.
@@ -55,9 +55,9 @@ impl Default for Lit {
 }
 
 impl ShadingBatch {
-    /// Finds what `light` does at each point of a surface of `bsdf`, on which highlights may be narrow if it `needs_cones`;
-    /// backs of what `has_inside`, which needs them, too, are seen from inside. Of an area light it is the `place`th of those
-    /// that each point has drawn.
+    /// Computes the contribution of `light` at each point of a surface of `bsdf`, whose highlights may be narrow if it
+    /// `needs_cones`; if it `has_inside`, which implies cones, backs are seen from inside. For an area light, `place` is the
+    /// index of each point's sample.
     pub(crate) fn shade_light(
         &mut self,
         (bsdf, needs_cones, has_inside): (&Bsdf, bool, bool),
@@ -93,12 +93,12 @@ impl ShadingBatch {
         }
     }
 
-    /// The points that it shines on: the sample of each, and what it shows.
+    /// Points that the light reaches: the sample of each, and the contribution.
     pub(crate) fn lit_samples(&self) -> impl Iterator<Item = (u32, Vec3)> {
         self.lit_as(|seen| seen != 0).map(|(i, radiance)| (self.samples[i], radiance))
     }
 
-    /// The lit points whose shadow rays [`Self::send`] does not send: their numbers, and what they show.
+    /// Lit points whose shadow rays [`Self::send`] does not send: indices and contributions.
     pub(crate) fn grazing_points(&self) -> impl Iterator<Item = (usize, Vec3)> {
         let any = self.lit.seen[..padded(self.count)].iter().fold(0, |all, seen| all | seen) & GRAZING != 0;
         self.lit_as(move |seen| any && seen == GRAZING)
@@ -109,8 +109,8 @@ impl ShadingBatch {
         points.map(|i| (i, get(&self.lit.radiance, i)))
     }
 
-    /// Leaves out the points whose shadow rays are not sent: asks for each, by the place of the ray that came to it in
-    /// what was traced, with its sample and what it shows.
+    /// Drops the points whose shadow rays `sends` rejects; it gets the index of the traced ray that hit the point, the point's
+    /// sample and its contribution.
     pub(crate) fn choose(&mut self, mut sends: impl FnMut(usize, u32, &mut Vec3) -> bool) {
         for i in 0..self.count.min(POINTS) {
             if self.lit.seen[i] == 0 {
@@ -125,7 +125,7 @@ impl ShadingBatch {
         }
     }
 
-    /// Sends the shadow rays that start on their triangles, outside of everything where that matters.
+    /// Sends the shadow rays that start on their triangles, outside of all media where that matters.
     pub(crate) fn send(&self, shadows: &mut ShadowQueue, absorbs: bool) {
         let count = self.write(shadows.room());
         shadows.take(count, std::iter::repeat_n(Media::OUTSIDE, if absorbs { count } else { 0 }));
@@ -138,7 +138,7 @@ impl ShadingBatch {
         shadows.take(count, rays.map(|(&ray, _)| traced.path(ray as usize).media).take(count));
     }
 
-    /// Writes the shadow rays that start on their triangles; how many there are.
+    /// Writes the shadow rays that start on their triangles; returns their number.
     fn write(&self, (rays, light): (&mut [Ray; POINTS], &mut [Bound; POINTS])) -> usize {
         let (prims, samples, lit) = (self.given.faces.prims(), &self.samples, &self.lit);
         self.level.run(Send { points: self.count.min(POINTS), prims, samples, lit, rays, light })
@@ -155,7 +155,7 @@ struct Send<'a> {
 }
 
 impl Kernel for Send<'_> {
-    /// How many rays there are.
+    /// Number of rays written.
     type Output = usize;
 
     #[inline(always)]
@@ -175,7 +175,7 @@ impl Kernel for Send<'_> {
             let from = s.rows([s.load(&ox), s.load(&oy), s.load(&oz), s.splat(0.0)]);
             let to = s.rows([s.load(&dx), s.load(&dy), s.load(&dz), s.load(&end)]);
             let [r, g, b] = three(&lit.radiance);
-            // Numbers of samples only pass through the lanes, as bits.
+            // Sample indices only pass through the lanes, as bits.
             let light = s.rows([s.load(&r), s.load(&g), s.load(&b), s.load(bytemuck::cast_ref(samples))]);
             let mut put = |at: usize, i: usize| {
                 rays[at % POINTS] = Ray::from_fours([from[i], to[i]], prims[i], samples[i]);
@@ -192,26 +192,26 @@ impl Kernel for Send<'_> {
     }
 }
 
-/// What one light does at points.
+/// Contribution of one light at the points.
 struct DirectLight<'a> {
     found: &'a Found,
     lit: &'a mut Lit,
     points: usize,
     bsdf: &'a Bsdf,
     painted: &'a Painted,
-    /// What points are made of that more changes than columns know.
+    /// BSDFs of the points, where columns cannot describe them.
     point_bsdfs: &'a [Bsdf],
-    /// What lies over points.
+    /// Overlays of the points.
     overlays: Option<&'a Overlays>,
-    /// Where highlights may be narrow.
+    /// Cones, where highlights may be narrow.
     cones: Option<&'a Cones>,
     has_inside: bool,
     light: &'a LocalLight,
-    /// What was drawn of it, and which of that counts, if it is an area light.
+    /// Samples of an area light, and the index of the current one.
     drawn: Option<(&'a mut Drawn, u32)>,
 }
 
-/// Of a light without extent.
+/// Kernel for a light without extent.
 struct FromPoint<'a>(DirectLight<'a>);
 
 impl Kernel for FromPoint<'_> {
@@ -223,7 +223,7 @@ impl Kernel for FromPoint<'_> {
     }
 }
 
-/// Of an area light: a kernel of its own, which leaves the other one its lanes.
+/// Kernel for an area light: separate, so that the other one stays vectorised.
 struct FromArea<'a>(DirectLight<'a>);
 
 impl Kernel for FromArea<'_> {
@@ -254,7 +254,7 @@ impl DirectLight<'_> {
             }
             _ => light.arriving_at(points, (position, |_| None), |i, it| arrive(lit, i, it, in_lux)),
         }
-        // The model is chosen outside the loop, which then is a formula.
+        // The model is matched outside the loop, which is then branch-free.
         match bsdf.model {
             _ if !point_bsdfs.is_empty() => reflect_with_lobes(found, lit, point_bsdfs),
             Model::Unlit(_) => lit.seen.fill(0),
@@ -281,7 +281,7 @@ impl DirectLight<'_> {
     }
 }
 
-/// Keeps the light that arrives at a point.
+/// Stores the light that arrives at a point.
 #[inline(always)]
 fn arrive(lit: &mut Lit, i: usize, (incident, arrives): (Incident, bool), in_lux: bool) {
     put(&mut lit.to_light, i, incident.to_light);
@@ -289,14 +289,14 @@ fn arrive(lit: &mut Lit, i: usize, (incident, arrives): (Incident, bool), in_lux
     lit.seen[i] = u32::from(arrives);
 }
 
-/// What points of Phong's model reflect of the light that arrives.
+/// Computes the light that points of Phong's model reflect.
 #[inline(always)]
 fn reflect_phong(found: &Found, lit: &mut Lit, points: usize, bsdfs: &impl PointBsdf<Bsdf = PhongBsdf>) {
     let highlights = &highlights(found, lit, points, bsdfs);
     reflect(found, lit, points, &Phong { bsdfs, highlights });
 }
 
-/// What points of metallic-roughness reflect of the light that arrives. What has overlays, or an inside, always has cones.
+/// Computes the light that metallic-rough points reflect. Points with overlays, or with an inside, always have cones.
 #[inline(always)]
 fn reflect_metal_rough(
     found: &Found,
@@ -318,7 +318,7 @@ fn reflect_metal_rough(
     }
 }
 
-/// How bright Phong's highlight is at each point. Powers are found one by one, and only where there is something to see.
+/// Phong's highlight at each point. Powers are computed one by one, and only for visible highlights.
 #[inline(always)]
 fn highlights(found: &Found, lit: &Lit, points: usize, bsdfs: &impl PointBsdf<Bsdf = PhongBsdf>) -> Column {
     let mut highlights = [0.0; POINTS];
@@ -336,7 +336,7 @@ fn highlights(found: &Found, lit: &Lit, points: usize, bsdfs: &impl PointBsdf<Bs
     highlights
 }
 
-/// Keeps what a point shows of a light that arrives, if that counts; it may lie above the horizon or below.
+/// Stores the contribution of a light at a point, if it `counts`; `above` tells whether it lies above the horizon.
 #[inline(always)]
 fn keep(found: &Found, lit: &mut Lit, i: usize, (radiance, counts): (Vec3, bool), above: bool) {
     let grazes = above & (found.curved[i] == 1) & (get(&found.geometric, i).dot(get(&lit.to_light, i)) < STEEP);
@@ -346,7 +346,7 @@ fn keep(found: &Found, lit: &mut Lit, i: usize, (radiance, counts): (Vec3, bool)
     put(&mut lit.radiance, i, radiance);
 }
 
-/// What the points under overlays reflect of the light that arrives.
+/// Computes the light that points below overlays reflect.
 #[inline(always)]
 fn reflect_below(found: &Found, lit: &mut Lit, points: usize, formula: &impl Formula) {
     for i in 0..points.min(POINTS) {
@@ -356,7 +356,7 @@ fn reflect_below(found: &Found, lit: &mut Lit, points: usize, formula: &impl For
     }
 }
 
-/// Keeps what all points show of light that arrives from above.
+/// Keeps the contributions of light from above the horizon at all points.
 #[inline(always)]
 fn keep_all(found: &Found, lit: &mut Lit, points: usize) {
     for i in 0..points.min(POINTS) {
@@ -366,7 +366,7 @@ fn keep_all(found: &Found, lit: &mut Lit, points: usize) {
     }
 }
 
-/// What points with more lobes reflect of the light that arrives, and what they let through.
+/// Computes the light that points with further lobes reflect and transmit.
 fn reflect_with_lobes(found: &Found, lit: &mut Lit, point_bsdfs: &[Bsdf]) {
     for (i, bsdf) in point_bsdfs.iter().enumerate().take(POINTS) {
         let (horizon, normal, view) = (get(&found.horizon, i), get(&found.normal, i), get(&found.view, i));
@@ -383,7 +383,7 @@ fn reflect_with_lobes(found: &Found, lit: &mut Lit, point_bsdfs: &[Bsdf]) {
     lit.seen[point_bsdfs.len().min(POINTS)..].fill(0);
 }
 
-/// What the points reflect of the light that arrives.
+/// Computes the light that the points reflect.
 #[inline(always)]
 fn reflect(found: &Found, lit: &mut Lit, points: usize, formula: &impl Formula) {
     for i in 0..points.min(POINTS) {
@@ -396,7 +396,7 @@ fn reflect(found: &Found, lit: &mut Lit, points: usize, formula: &impl Formula) 
     }
 }
 
-/// Where shadow rays start, and where they go.
+/// Computes origins and directions of the shadow rays.
 #[inline(always)]
 fn start(found: &Found, lit: &mut Lit, points: usize, light: impl Fn(usize) -> Option<Vec3>) {
     let mut turned = 0;
@@ -409,7 +409,7 @@ fn start(found: &Found, lit: &mut Lit, points: usize, light: impl Fn(usize) -> O
         lit.end[i] = end;
         turned |= u32::from((geometric.dot(to_light) < 0.0) != (geometric.dot(dir) < 0.0));
     }
-    // A ray leaves on the side to which it goes; that is hardly ever another than that of the light.
+    // A ray leaves on the side it goes to; that is hardly ever another side than the light's.
     if turned == 1 {
         for i in 0..points.min(POINTS) {
             put(&mut lit.origin, i, leave(found, i, get(&lit.dir, i)));

@@ -1,6 +1,6 @@
-//! Points with more lobes than that of their facets, those of a grain, film, sheen or clear coat, with maps of their
-//! reflectance, or that scatter light to their other side: where they are and how they are seen is found side by side, what
-//! they are made of one by one, unless all their lobes are [overlays](super::overlays).
+//! Points with lobes beyond their microfacets (anisotropy, film, sheen or clear coat), with maps of their reflectance, or with
+//! diffuse transmission: surface and view are computed side by side, BSDFs one by one, unless all their lobes are
+//! [overlays](super::overlays).
 
 use super::PlacedMesh;
 use super::columns::{POINTS, ShadingBatch, get};
@@ -20,8 +20,7 @@ use crate::render::world::Placement;
 use crate::scene::MetalRough;
 
 impl ShadingBatch {
-    /// Finds what the points of a mesh that an instance has placed so are made of, once their common maps have been read and
-    /// cones bent.
+    /// Computes the BSDFs of the points of a placed mesh, once their common maps have been read and cones bent.
     pub(crate) fn complete(
         &mut self,
         context: &Context,
@@ -49,7 +48,8 @@ impl ShadingBatch {
         self.point_bsdfs = point_bsdfs;
     }
 
-    /// Tells of each point what its lobes lie on, or nothing where the tracer must look itself, with what reads their maps.
+    /// Passes the frame of each point's lobes to `tell`, or `None` where the tracer must shade the point itself, with the reader
+    /// of their maps.
     pub(super) fn each_lobe_frame(
         &self,
         context: &Context,
@@ -90,12 +90,12 @@ impl ShadingBatch {
         }
     }
 
-    /// What point `i` is made of with all its lobes, if it has more than one.
+    /// BSDF of point `i` with all its lobes, if it has more than one.
     pub(crate) fn point_bsdf(&self, i: usize) -> Option<&Bsdf> {
         self.point_bsdfs.get(i)
     }
 
-    /// What lobes lie on at point `i` of a patch of a mesh, with `placement` where it has normals of its own.
+    /// Frame of the lobes at point `i` of a patch of a mesh; `placement` is given where the mesh has vertex normals.
     fn lobe_frame<'a>(&self, i: usize, placement: Option<&Placement>, patch: Option<&'a Patch<'a>>) -> LobeFrame<'a> {
         let own = placement.map_or(self.given.faces.outward(i), |placement| self.given.own_normal(placement, i));
         let geometric = get(&self.found.geometric, i);
@@ -104,7 +104,7 @@ impl ShadingBatch {
         LobeFrame { patch, smooth: own * side, side, geometric, normal, view }
     }
 
-    /// Widens highlights at point `i` so far that they are met by rays.
+    /// Widens highlights at point `i` so that rays hit them.
     fn widen_highlights(&self, i: usize, context: &Context, m: &MetalRough, bsdf: &mut Bsdf, patch: Option<&Patch>) {
         if context.lights.is_empty() {
             return;
@@ -117,7 +117,7 @@ impl ShadingBatch {
         }
     }
 
-    /// Widens highlights of clear coat at point `i` so far that they are met by rays.
+    /// Widens highlights of the clear coat at point `i` so that rays hit them.
     pub(super) fn widen_coat(
         &self,
         i: usize,
@@ -135,7 +135,7 @@ impl ShadingBatch {
         coat.widen_highlight(self.least_square(i, context, patch.zip(map).map_or(0.0, turning)));
     }
 
-    /// α² of narrow highlights at point `i` at least, where a normal map turns the surface by angles of such squares.
+    /// Lower bound of α² in narrow highlights at point `i`, with the squared angles by which a normal map turns the surface.
     fn least_square(&self, i: usize, context: &Context, turning: f32) -> f32 {
         let (reach, cones) = (context.highlight_reach, &self.cones);
         glint::least_of(cones.bend[i] * (reach * reach) + turning, cones.spread[i], reach)

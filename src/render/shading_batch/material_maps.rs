@@ -1,4 +1,4 @@
-//! Maps of a material and colours of vertices that points of a batch read side by side.
+//! Maps of a material and vertex colours that are read side by side for the points of a batch.
 
 use super::PlacedMesh;
 use super::columns::{Column, Columns, Found, Given, LANES, POINTS, ShadingBatch, get, padded, put};
@@ -15,7 +15,7 @@ use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, ch
 use crate::render::world::Placement;
 use crate::scene::{Material, Mesh, MetalRough, Reflection, TextureRef, UvTransform};
 
-/// What a map is read for.
+/// Use of a map.
 #[derive(Clone, Copy, Debug)]
 enum Slot {
     Base,
@@ -32,57 +32,57 @@ enum Slot {
 
 const SLOTS: usize = 10;
 
-/// What the maps of eight points say.
+/// Texels of the maps at eight points.
 type Texels = [[Vec4; LANES]; SLOTS];
 
-/// Coordinates that the maps of a material may have.
+/// Maximum number of coordinate sets (with transform) of a material's maps.
 const GROUPS: usize = 2;
 
-/// Maps of lobes and of reflectance that a material may have.
+/// Maximum number of maps of lobes and of reflectance of a material.
 pub(super) const LOBE_MAPS: usize = 11;
 
-/// What maps of lobes and of reflectance say at every point.
+/// Texels of the maps of lobes and of reflectance at every point.
 pub(super) type LobeTexels = [[Vec4; POINTS]; LOBE_MAPS];
 
-/// The maps of a material.
+/// Maps of a material.
 #[derive(Clone, Debug)]
 pub(crate) struct MaterialMaps {
     groups: Vec<Group>,
-    /// The texture of the normal map, which is in the first group, and how its texels lie.
+    /// Texture of the normal map, which is in the first group, and its layout.
     normal_map: Option<(u32, Layout)>,
-    /// Maps of lobes and of reflectance, by their places among [`LobeTexels`]; empty where these are not read here.
+    /// Maps of lobes and of reflectance, by their indices in [`LobeTexels`]; empty where these are not read here.
     lobes: Vec<(TextureRef, ColorSpace)>,
 }
 
-/// Maps that have the same coordinates.
+/// Maps with the same coordinates.
 #[derive(Clone, Debug)]
 struct Group {
     uv_set: u32,
     transform: UvTransform,
     turn: Turn,
     stacks: Vec<Stack>,
-    /// Textures by which the material is cut out, and what each is read for.
+    /// Textures with an alpha cutoff, and the use of each.
     cuts: Vec<(Slot, u32)>,
 }
 
-/// Maps that are read in the same places.
+/// Maps that are read at the same texel addresses.
 #[derive(Clone, Debug)]
 struct Stack {
     layout: Layout,
     maps: Vec<Map>,
 }
 
-/// A texture that is read in one way, and for what: mostly one thing, but occlusion often lies where metalness does.
+/// A texture in one colour space with its uses: mostly one, but occlusion often shares a map with metalness.
 #[derive(Clone, Debug)]
 struct Map {
     texture: u32,
     space: ColorSpace,
     slots: Vec<Slot>,
-    /// Places among [`LobeTexels`], where it belongs to lobes or reflectance.
+    /// Indices in [`LobeTexels`], where it belongs to lobes or reflectance.
     lobes: Vec<usize>,
 }
 
-/// What something read from a map is for.
+/// Use of a texel.
 #[derive(Clone, Copy)]
 enum For {
     Slot(Slot),
@@ -90,10 +90,10 @@ enum For {
 }
 
 impl MaterialMaps {
-    /// `None` for materials whose maps have too many coordinates, and for those of which one is read in another way.
+    /// `None` for materials whose maps have too many coordinate sets, or one map that cannot be read here.
     pub(super) fn of(material: &Material, store: &TextureStore) -> Option<Self> {
         let maps = maps(material);
-        // How thick glass is does not matter where rays go through it; maps of lobes are read with these.
+        // The thickness of glass is irrelevant where rays pass through it; maps of lobes are read with these.
         let others = |m: &MetalRough| usize::from(m.thickness_map.is_some()) + other_maps(m);
         if maps.len() + material.metal_rough().map_or(0, others) < material.textures().count() {
             return None;
@@ -120,7 +120,7 @@ impl MaterialMaps {
         Some(with_lobes.unwrap_or(material_maps))
     }
 
-    /// These maps and those of lobes; `None` where one of them is read in another way, or there are too many coordinates.
+    /// These maps and those of lobes; `None` where one cannot be read here, or there are too many coordinate sets.
     fn with_lobes(mut self, m: &MetalRough, store: &TextureStore) -> Option<Self> {
         for (map, space) in lobe_maps(m) {
             let layout = Layout::of(store, map.texture)?;
@@ -131,12 +131,12 @@ impl MaterialMaps {
         Some(self)
     }
 
-    /// The maps of lobes that it reads, by their places among [`LobeTexels`].
+    /// Maps of lobes that it reads, by their indices in [`LobeTexels`].
     pub(super) fn lobes(&self) -> &[(TextureRef, ColorSpace)] {
         &self.lobes
     }
 
-    /// The group of a map; `None` where there is no room for one more.
+    /// Group of a map; `None` where there is no room for another.
     fn group(&mut self, map: &TextureRef) -> Option<usize> {
         let is_same = |group: &Group| (group.uv_set, group.transform) == (map.uv_set, map.transform);
         let found = self.groups.iter().position(is_same);
@@ -149,7 +149,7 @@ impl MaterialMaps {
         found
     }
 
-    /// Whether there is something to read on a mesh, and it has what it takes.
+    /// Whether there is anything to read on a mesh, and the mesh has the attributes it needs.
     pub(super) fn covers(&self, mesh: &Mesh) -> bool {
         let turns = self.normal_map.is_some();
         let colored = !mesh.colors.is_empty();
@@ -159,12 +159,12 @@ impl MaterialMaps {
             && !(turns && mesh.tangents.is_empty())
     }
 
-    /// Whether it wants colours of corners there, or more than their coordinates of the first group.
+    /// Whether it needs vertex colours there, or coordinates beyond those of the first group.
     pub(super) fn wants_extras(&self, mesh: &Mesh) -> bool {
         !mesh.colors.is_empty() || self.groups.len() > 1
     }
 
-    /// The coordinates of the corners for the `k`th group, but for the offset.
+    /// Coordinates of the corners for the `k`th group, without the offset.
     pub(super) fn coordinates(&self, k: usize, mesh: &Mesh, corners: [u32; 3]) -> [Vec2; 3] {
         let Some(group) = self.groups.get(k) else { return [Vec2::ZERO; 3] };
         let set = mesh.uvs.get(group.uv_set as usize);
@@ -174,7 +174,7 @@ impl MaterialMaps {
 }
 
 impl Group {
-    /// Reads what its maps say at so many of these spots; those of lobes and reflectance from `start` on, if they are wanted.
+    /// Reads its maps at `points` of these spots; those of lobes and reflectance from `start` on, if they are wanted.
     #[inline(always)]
     fn read<S: Simd>(
         &self,
@@ -205,7 +205,7 @@ impl Group {
         }
     }
 
-    /// Reads the numbers that cut the material out at so many of these spots.
+    /// Reads the opacities of a cut-out material at `points` of these spots.
     #[inline(never)]
     fn cut(&self, store: &TextureStore, spots: &Spots, texels: &mut Texels, points: usize) {
         for &(slot, texture) in &self.cuts {
@@ -237,7 +237,7 @@ impl Group {
     }
 }
 
-/// The maps that batches know, and what for.
+/// Maps that batches can read, with their uses.
 fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
     let ([metal_rough, transmission], [ambient, specular, shininess]) = match &material.reflection {
         Reflection::MetalRough(m) => ([&m.metal_rough_map, &m.transmission_map].map(Option::as_ref), [None; 3]),
@@ -259,8 +259,8 @@ fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
     all.into_iter().filter_map(|(slot, map, space)| Some((slot, map?, space))).collect()
 }
 
-/// Maps of lobes and of reflectance, and what their numbers mean, but for that of the normals of clear coat. Where one gives a
-/// colour and with its alpha another number, it is named once.
+/// Maps of lobes and of reflectance with their colour spaces, except the normal map of the clear coat. A map that gives a colour
+/// and another value in its alpha is listed once.
 fn lobe_maps(m: &MetalRough) -> impl Iterator<Item = (&TextureRef, ColorSpace)> {
     let both = |color, alpha| [(color, ColorSpace::Srgb), (alone(alpha, color), ColorSpace::Linear)];
     let numbers = |maps: [_; 2]| maps.map(|map: &Option<TextureRef>| (map.as_ref(), ColorSpace::Linear));
@@ -274,14 +274,14 @@ fn lobe_maps(m: &MetalRough) -> impl Iterator<Item = (&TextureRef, ColorSpace)> 
     all.filter_map(|(map, space)| Some((map?, space)))
 }
 
-/// A map of which alpha counts, if its colour is not read anyway.
+/// A map whose alpha is used, if its colour is not read anyway.
 fn alone<'a>(alpha: Option<&'a TextureRef>, color: Option<&TextureRef>) -> Option<&'a TextureRef> {
     alpha.filter(|_| alpha != color)
 }
 
 impl ShadingBatch {
-    /// Reads what maps of a material and the colours of vertices say at the points of a mesh that an instance has placed so, and
-    /// turns their normals. If lights show as highlights, which a normal map `widens`, it finds how far that turns them.
+    /// Reads maps and vertex colours at the points of a placed mesh, and turns their normals. If highlights are widened
+    /// (`widens`), also computes by how much a normal map turns them.
     pub(super) fn read_material_maps(
         &mut self,
         context: &Context,
@@ -296,7 +296,7 @@ impl ShadingBatch {
         let reach = context.highlight_reach;
         let turns = material_maps.normal_map.as_ref().filter(|_| widens).map(|map| (map, reach));
         let front = &found.front;
-        // Lobes lie on the outside; how much is reflected counts on both sides.
+        // Lobes lie on the outside; reflectance counts on both sides.
         let outside_alone = has_inside(material) && !material.metal_rough().is_some_and(reads_reflectance);
         level.run(Read {
             material_maps,
@@ -334,7 +334,7 @@ struct Read<'a> {
     painted: &'a mut Painted,
     of_lobes: &'a mut LobeTexels,
     places: &'a mut Places,
-    /// The normal map, where its changes count within such a reach.
+    /// The normal map, and the reach within which its changes count.
     turns: Option<(&'a (u32, Layout), f32)>,
     colored: bool,
     count: usize,
@@ -393,7 +393,7 @@ impl Kernel for Read<'_> {
     }
 }
 
-/// Finds where eight points from `start` on read maps with these coordinates at the corners, and how far around.
+/// Computes the coordinates and footprints of eight points from `start` on, from the coordinates of the corners.
 #[inline(always)]
 fn spread(
     spots: &mut Spots,
@@ -412,7 +412,7 @@ fn spread(
     }
 }
 
-/// What maps and the colour of vertices make of a material at a point.
+/// Computes the material at a point from its maps and vertex colour.
 #[inline(always)]
 fn inputs(painted: &mut Painted, i: usize, (material, vertex): (&Material, Vec4), texel: impl Fn(Slot) -> Vec4) {
     let base = base_color(material, texel(Slot::Base), texel(Slot::Opacity).x, vertex);
@@ -436,7 +436,7 @@ fn inputs(painted: &mut Painted, i: usize, (material, vertex): (&Material, Vec4)
     }
 }
 
-/// Turns normals by the texels of a normal map.
+/// Kernel that turns normals by the texels of a normal map.
 struct TurnNormals<'a> {
     given: &'a Given,
     found: &'a mut Found,
@@ -483,14 +483,13 @@ impl Kernel for TurnNormals<'_> {
             let geometric = get(&found.geometric, i);
             let side = side_of(get(&turns.own, i), geometric);
             put(&mut found.normal, i, facing(get(&turns.turned, i) * side, geometric, get(&found.view, i)));
-            // Without a tangent it takes the coordinates around.
+            // Without a tangent it would need the coordinates around.
             found.certain[i] &= u32::from(turns.tangent[0][i].is_finite());
         }
     }
 }
 
-/// The steps from a mesh's own normal to the turned one: in columns that nothing else can point at, so that compilers make
-/// lanes of each.
+/// Steps from a mesh's own normal to the turned one: in columns that cannot alias, so that compilers vectorise each loop.
 struct Turns {
     own: Columns,
     tangent: Columns,

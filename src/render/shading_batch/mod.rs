@@ -1,14 +1,14 @@
-//! Points of surfaces, shaded side by side: one number of all points, then the next.
+//! Surface points shaded side by side, as columns (structure of arrays).
 //!
-//! Where a material has no more lobes than that of its facets, what a point shows, and what it mirrors, depends on a few
-//! numbers, and the same formulas are computed for all points. They are written once, for one point, in `surface`, `patch`,
-//! `shade`, `glint` and `accel::refine`; here loops over columns of numbers call them, which the compiler turns into lanes.
-//! So a point shaded here gives the same bits as one shaded by itself, on every instruction set. Of lights with an extent
-//! each point draws places of its own (`area_lights`). Sheen and clear coat lie over what the columns know (`overlays`).
-//! Rays that go on from glass and clear coat, what other lobes of a material show, and what is seen of panoramas and by
-//! rays to the surroundings, are found point by point, from the numbers in the columns (`lobes`, `batch_point`).
+//! Where a material has no lobes beyond its microfacets, reflection and mirror rays depend on a few numbers, and the same
+//! formulas hold for all points. They are written once, for one point, in `surface`, `patch`, `shade`, `glint` and
+//! `accel::refine`; here loops over columns call them, which the compiler vectorises. So a point shaded here gives the same bits
+//! as one shaded by itself, on every instruction set. On area lights each point draws samples of its own (`area_lights`). Sheen
+//! and clear coat lie over the columns' result (`overlays`). Rays that go on from glass and clear coat, other lobes of a
+//! material, and light of panoramas and by rays to the environment are computed point by point, from the columns (`lobes`,
+//! `batch_point`).
 //!
-//! What a column cannot do is left to the tracer: hits near the edge of a face, those whose distance needs more than
+//! Cases that columns cannot handle are left to the tracer: hits near the edge of a face, those whose distance needs more than
 //! `f64`, points whose mesh gives no tangent, and glass from which no ray goes on.
 
 mod area_lights;
@@ -36,7 +36,7 @@ pub(crate) use constants::MaterialConstants;
 pub(crate) use hits_by_instance::HitsByInstance;
 pub(crate) use pass_through::PassThrough;
 
-/// A mesh, and where an instance has placed it.
+/// A mesh with the placement of its instance.
 #[derive(Clone, Copy)]
 pub(crate) struct PlacedMesh<'a> {
     pub mesh: &'a Mesh,

@@ -1,7 +1,7 @@
 //! Sheen and clear coat over the points of a batch.
 //!
-//! They leave what lies under them as it is: that is found side by side as if there were none, and so is what they take off it
-//! and add to it.
+//! They do not change the layers below: these are computed side by side as if there were no overlays, and so is the light that
+//! the overlays remove and add.
 
 use super::PlacedMesh;
 use super::columns::{Column, Columns, Found, POINTS, ShadingBatch, get, put};
@@ -14,16 +14,16 @@ use crate::render::context::Context;
 use crate::render::shade::{CoatLobe, Model, SheenLobe, albedo_of_each, overlays, terminator};
 use crate::render::shade_hits::TracedRays;
 
-/// Both of each point: those of their numbers that maps and views change.
+/// Sheen and clear coat of each point: the parameters that maps and views change.
 pub(super) struct Overlays {
-    /// Whether the material has them; else nothing here counts.
+    /// Whether the material has sheen, or clear coat; if not, its columns are meaningless.
     has_sheen: bool,
     has_coat: bool,
     /// [`SheenLobe`]; black where there is none.
     color: Columns,
     sheen_roughness: Column,
     albedo: Column,
-    /// [`CoatLobe`]; without strength where there is none.
+    /// [`CoatLobe`]; strength 0 where there is none.
     strength: Column,
     coat_roughness: Column,
     normal: Columns,
@@ -31,8 +31,8 @@ pub(super) struct Overlays {
     taken: Column,
     occlusion: Column,
     least_square: Column,
-    /// Where what one of them mirrors is looked for, and what is found there; shares of f0 and f90 in what a clear coat
-    /// sends back.
+    /// Directions of the mirrored lookups of one of them, and the light found there; shares of f0 and f90 in the albedo of the
+    /// clear coat.
     dirs: Columns,
     light: Columns,
     shares: [Column; 2],
@@ -62,8 +62,8 @@ impl Default for Overlays {
 }
 
 impl ShadingBatch {
-    /// Finds the sheen and the clear coat at the points of a mesh that an instance has placed so, once their common maps
-    /// have been read and cones bent, if there is nothing else on them than these.
+    /// Computes sheen and clear coat at the points of a placed mesh, once their common maps have been read and cones bent, if
+    /// they are its only further lobes.
     pub(crate) fn overlay(
         &mut self,
         context: &Context,
@@ -91,7 +91,7 @@ impl ShadingBatch {
 }
 
 impl Overlays {
-    /// Forgets them.
+    /// Removes all overlays.
     pub(super) fn clear(&mut self) {
         (self.has_sheen, self.has_coat) = (false, false);
     }
@@ -130,13 +130,13 @@ impl Overlays {
         }
     }
 
-    /// What lies over point `i`.
+    /// Sheen and clear coat of point `i`.
     pub(super) fn at(&self, i: usize) -> (Option<SheenLobe>, Option<CoatLobe>) {
         let sheen = self.has_sheen.then(|| self.sheen(i)).filter(|sheen| sheen.color != Vec3::ZERO);
         (sheen, self.has_coat.then(|| self.coat(i)).filter(|coat| coat.strength > 0.0))
     }
 
-    /// Shares of what is under the clear coat, and under both, that are seen.
+    /// Shares of the light that pass through the clear coat, and through both.
     #[inline(always)]
     fn clear_at(&self, i: usize) -> [f32; 2] {
         let below_coat = if self.has_coat { self.coat(i).clear() } else { 1.0 };
@@ -144,7 +144,7 @@ impl Overlays {
         [below_coat, below_coat * sheen]
     }
 
-    /// Makes of what points under them show of a light what is seen.
+    /// Attenuates the light of a lamp that points below them reflect, and adds their own.
     #[inline(always)]
     pub(super) fn reflect(&self, found: &Found, lit: &mut Lit, points: usize) {
         for i in 0..points.min(POINTS) {
@@ -176,7 +176,7 @@ impl Overlays {
         }
     }
 
-    /// Makes of what points under them show of their surroundings what is seen, with what they shine with themselves.
+    /// Attenuates the environment light that points below them reflect, and adds their own and emission.
     #[inline(always)]
     pub(super) fn show<S: Simd>(
         &mut self,
@@ -230,7 +230,7 @@ impl Overlays {
         points: usize,
         everywhere: EnvironmentLight,
     ) {
-        // Of what is as smooth as clear coat mostly is rays show all.
+        // Coats are mostly so smooth that rays show all of their reflection.
         let looked_up = (0..points).fold(false, |any, i| any | (self.coat(i).looked_up() > 0.0));
         if !looked_up {
             return;

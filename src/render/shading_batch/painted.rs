@@ -1,8 +1,8 @@
-//! What maps and colours of vertices say at the points of a batch.
+//! Material parameters from maps and vertex colours at the points of a batch.
 //!
-//! They are mostly read side by side ([`MaterialMaps`](super::material_maps::MaterialMaps)), else point by point, as
-//! [`Surface`](crate::render::surface::Surface) reads them; what follows from them is computed side by side. So is what
-//! follows from how far rough surfaces on the way have blurred what is seen, which makes any material rougher.
+//! Maps are mostly read side by side ([`MaterialMaps`](super::material_maps::MaterialMaps)), else point by point, as
+//! [`Surface`](crate::render::surface::Surface) reads them; the parameters are computed from them side by side. So is the blur by
+//! rough surfaces on the way, which makes any material rougher.
 
 use super::PlacedMesh;
 use super::columns::{Column, Columns, POINTS, ShadingBatch, get, padded, put};
@@ -19,11 +19,11 @@ use crate::render::surface::{HitPrim, mapped_normal, side_of};
 use crate::render::whitted::SPREAD;
 use crate::scene::Material;
 
-/// A material at each point: those of its numbers that maps change.
+/// Material at each point: the parameters that maps change.
 pub(super) struct Painted {
-    /// Whether they do; else nothing here counts.
+    /// Whether maps change any; if not, the columns are meaningless.
     pub any: bool,
-    /// How much of each point is seen, where maps or vertices were read.
+    /// Coverage of each point, where maps or vertices were read.
     pub(super) coverage: Column,
     base: Columns,
     emission: Columns,
@@ -35,7 +35,7 @@ pub(super) struct Painted {
     specular: Columns,
     mirror: Columns,
     shininess: Column,
-    /// The texel of a normal map that was read side by side.
+    /// Texel of a normal map that was read side by side.
     normal: Columns,
 }
 
@@ -108,7 +108,7 @@ impl Painted {
         get(&self.normal, i)
     }
 
-    /// Whether lights show as narrow highlights of a metallic-rough material.
+    /// Whether a metallic-rough material has narrow highlights of lights.
     pub(super) fn has_narrow_highlight(&self, i: usize) -> bool {
         is_narrow(self.roughness[i])
     }
@@ -118,7 +118,7 @@ impl Painted {
         get(&self.emission, i)
     }
 
-    /// What is seen of a material that no light changes.
+    /// Colour of an unlit material.
     #[inline(always)]
     pub(super) fn unlit(&self, i: usize) -> Vec3 {
         get(&self.base, i)
@@ -148,7 +148,7 @@ impl Painted {
 }
 
 impl Painted {
-    /// A model at point `i`, which is `unmapped` but for maps.
+    /// Model at point `i`; `unmapped` is the model without maps.
     pub(super) fn model(&self, i: usize, unmapped: &Model) -> Model {
         match unmapped {
             Model::Unlit(_) => Model::Unlit(self.unlit(i)),
@@ -159,7 +159,7 @@ impl Painted {
 }
 
 impl ShadingBatch {
-    /// Blurs a surface of `bsdf` where it is seen along paths that rough surfaces have spread, after its maps were read.
+    /// Roughens a surface of `bsdf` at points seen along paths that rough surfaces have spread, after its maps were read.
     pub(crate) fn blur(&mut self, traced: TracedRays, bsdf: &Bsdf) {
         let (Model::MetalRough(m), TracedRays::Wave(..)) = (&bsdf.model, traced) else { return };
         let rays = &self.rays[..self.count.min(POINTS)];
@@ -180,7 +180,7 @@ impl ShadingBatch {
         }
     }
 
-    /// Reads what maps and vertices say at the points of a mesh that an instance has placed so.
+    /// Reads maps and vertex colours at the points of a placed mesh.
     pub(crate) fn read(
         &mut self,
         context: &Context,

@@ -1,22 +1,21 @@
-//! What lies behind the points of a batch that are not there as a whole: backs of one-sided faces, absent texels, what
-//! is blended.
+//! Rays that pass the points of a batch: backs of one-sided faces, gaps of masked materials, blended surfaces.
 
 use super::columns::{POINTS, ShadingBatch, get, put};
 use super::cones::ONES;
 use super::constants::MaterialConstants;
 
-/// What a ray that goes on behind a point has passed there.
+/// What a ray has passed at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum PassThrough {
-    /// The back of a face that is seen from its front alone.
+    /// The back of a face that is visible from its front only.
     Back,
-    /// A surface of which so much is seen, less than 1.
+    /// A surface with this coverage, less than 1.
     Covered(f32),
 }
 
 impl ShadingBatch {
-    /// Leaves out the points of which nothing is seen, and weakens the rays of those of which a part is. Tells of both what their
-    /// rays pass, these by their places in what was traced; `reads` says that maps or vertices were read.
+    /// Drops invisible points, and reduces the weights of the rays of partly covered ones. Passes to `tell` what rays pass at
+    /// both, by the index of the traced ray; `reads` tells whether maps or vertices were read.
     pub(crate) fn thin_out(
         &mut self,
         (constants, reads): (&MaterialConstants, bool),
@@ -52,7 +51,7 @@ impl ShadingBatch {
         }
     }
 
-    /// Whether no point is left that is shaded here.
+    /// Whether no point is left to be shaded here.
     pub(crate) fn is_empty(&self) -> bool {
         self.certain().next().is_none()
     }
