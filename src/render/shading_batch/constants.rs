@@ -34,11 +34,11 @@ pub(crate) struct MaterialConstants {
 /// Data of a material with lobes beyond its microfacets, or maps of its reflectance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lobes {
-    /// Whether the mesh around a point must be known, …
+    /// Whether the mesh around a point is needed, …
     pub reads_mesh: bool,
-    /// … or must if maps of lobes cannot be read side by side.
+    /// … or is needed if maps of lobes cannot be read side by side.
     pub reads_maps: bool,
-    /// Whether maps say how much it reflects.
+    /// Whether it has maps of its reflectance.
     pub reads_reflectance: bool,
     /// Whether the lobes are sheen and clear coat alone, which do not change the layers below.
     pub are_overlays: bool,

@@ -1,4 +1,4 @@
-//! The same bits, whoever computes them.
+//! Pictures have the same bits whichever way they are computed.
 
 use super::*;
 use crate::math::Vec2;
@@ -13,7 +13,7 @@ use crate::scene::{
 };
 use std::sync::Arc;
 
-/// A bit of everything: mirrors, glass, blending, textures aside.
+/// Some of everything except textures: mirrors, glass, blending.
 pub(super) fn busy() -> Stage {
     let mut s = stage(View::look_at(DVec3::new(1.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.8)));
     s.settings = Settings { width: 70, height: 50, samples: 3, cutoff: 1.0 / 512.0, layers: true, ..s.settings };
@@ -73,7 +73,7 @@ fn counting_changes_no_bit() {
     assert_eq!(counted.counts.primary.queries, 70 * 50 * 3);
 }
 
-/// Surfaces without maps of every model, seen from both sides, under every kind of light.
+/// Untextured surfaces of every model, seen from both sides, under every kind of light.
 fn plain() -> Stage {
     let mut s = stage(View::look_at(DVec3::new(1.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.8)));
     s.settings = Settings { width: 61, height: 47, samples: 3, depth: Some(1), layers: true, ..s.settings };
@@ -120,7 +120,7 @@ fn plain() -> Stage {
     s
 }
 
-/// Renders with points shaded side by side where they can be, and checks that one by one they have the same bits.
+/// Renders with points shaded side by side where possible, and asserts that shading one by one gives the same bits.
 #[track_caller]
 fn same_one_by_one(s: &mut Stage, what: &str) -> Rendered {
     let together = s.render();
@@ -145,7 +145,7 @@ fn points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one() {
     }
 }
 
-/// A stage with maps of everything that points side by side may read, tangents, and colours at the vertices of some meshes.
+/// A stage with every kind of map that batches can read, tangents, and vertex colours on some meshes.
 fn painted() -> Stage {
     let mut s = plain();
     let mut random = Random::new(8);
@@ -160,7 +160,7 @@ fn painted() -> Stage {
     let map = |texture| Some(TextureRef { texture, uv_set: 0, transform });
     let moved = UvTransform { offset: Vec2::new(0.3, -2.1), ..transform };
     for (i, material) in s.scene.materials.iter_mut().enumerate() {
-        // Some have two kinds of coordinates, some have three.
+        // Some materials use two coordinate sets, some three.
         let other = |texture| {
             let transform = if i == 5 { moved } else { UvTransform::default() };
             map(texture).map(|map| if i % 3 == 0 { map } else { TextureRef { uv_set: 1, transform, ..map } })
@@ -214,7 +214,7 @@ fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one()
     }
 }
 
-/// `s` with surfaces that are there in part, or nowhere, as maps, vertices or their materials say, and seen from behind.
+/// `s` with partly covered and absent surfaces, by map, vertex colour or material, some seen from behind.
 fn holed(mut s: Stage) -> Stage {
     let mut random = Random::new(3);
     for (i, material) in s.scene.materials.iter_mut().enumerate() {
@@ -246,7 +246,7 @@ fn points_that_are_there_in_part_have_the_same_bits_side_by_side() {
     }
 }
 
-/// `s` with glass: clear and coloured, smooth and rough, thin and thick, with things in it that absorb light, and maps.
+/// `s` with glass: clear and coloured, smooth and rough, thin and thick, with absorbing objects inside, and maps.
 fn glazed(mut s: Stage, textures: usize) -> Stage {
     s.settings = Settings { depth: Some(6), samples: 2, ..s.settings };
     let pane = |half: f32, thick: f32| {
@@ -282,7 +282,7 @@ fn glazed(mut s: Stage, textures: usize) -> Stage {
             (map(i % 3).filter(|_| i % 2 == 0), map(2).filter(|_| i % 3 == 0));
         let base_color_map = map(1).filter(|_| i != 1);
         let double_sided = i % 2 == 0;
-        // Some with all else that glass may have.
+        // Some glass with all other features.
         let rich = textures > 0 && i % 2 == 1;
         mapped.metal_rough_map = map(0).filter(|_| rich && i != 3);
         let (normal_map, occlusion_map, emission_map) = (map(2).filter(|_| rich), map(1).filter(|_| rich), map(0));
@@ -314,7 +314,7 @@ fn glazed(mut s: Stage, textures: usize) -> Stage {
             mesh.colors = mesh.positions.iter().map(|p| (p.abs() * 0.5 + 0.5).extend(1.0)).collect();
         }
         s.mesh(mesh, placed, material);
-        // Something in the middle of it.
+        // An object in the middle of it.
         s.mesh(square(0.2, 0.4 * half), placed, Material::plain());
     }
     s
@@ -330,7 +330,7 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
             MaterialConstants::of((0, m), &store, true, Gloss::new(None))
                 .is_some_and(|constants| constants.glass.is_some())
         };
-        // What scatters inside is shaded one by one.
+        // Materials that scatter light inside are shaded one by one.
         let expected = if textures > 0 { 4 } else { 6 };
         assert_eq!(s.scene.materials.iter().filter(beside).count(), expected, "nothing would be compared");
         s.scene.environment = environment;
@@ -343,7 +343,7 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
     }
 }
 
-/// A map of lobes of the `i`th material, of so many textures: every other one lies as maps of its colour do not.
+/// A lobe map of the `i`th material, out of `textures` textures: every other one has coordinates other than the colour maps'.
 fn lobe_map(textures: u32, i: usize, texture: u32) -> Option<TextureRef> {
     let turned = UvTransform { scale: Vec2::new(2.0, -1.5), rotation: 0.7, ..UvTransform::default() };
     let transform = if i.is_multiple_of(2) { UvTransform::default() } else { turned };
@@ -358,7 +358,7 @@ fn metal_roughs(s: &mut Stage) -> impl Iterator<Item = &mut MetalRough> {
     })
 }
 
-/// `s` with more lobes over what is metallic-rough, one or several each: their maps and those of reflectance are of so many
+/// `s` with further lobes on metallic-rough materials, one or several each; their maps and those of reflectance use `textures`
 /// textures.
 fn lobed(mut s: Stage, textures: u32) -> Stage {
     let map = |i, texture| lobe_map(textures, i, texture);
@@ -389,7 +389,7 @@ fn lobed(mut s: Stage, textures: u32) -> Stage {
         let pane = m.thick && m.transmission > 0.0;
         (m.specular, m.specular_map) = (0.7, map(i, 1).filter(|_| pane || i % 3 == 0));
         m.specular_color_map = map(i, 2).filter(|_| pane || i % 3 == 1);
-        // Of every other pane backs, too, reflect as these maps say.
+        // On every other pane, backs reflect as these maps say, too.
         panes += usize::from(pane);
         m.ior = if pane && panes % 2 == 0 { 0.0 } else { m.ior };
     }
@@ -407,7 +407,7 @@ fn lobes_shaded_side_by_side_have_the_bits_of_lobes_shaded_one_by_one() {
     ];
     for (environment, textures, depth, env_rays) in cases {
         let stage = if textures > 0 { painted() } else { plain() };
-        // Rough glass blurs what is seen through it.
+        // Rough glass blurs the surfaces seen through it.
         let mut s = lobed(if depth > 1 { glazed(stage, 3) } else { stage }, textures);
         for light in &mut s.scene.lights {
             light.size = if depth > 1 { 0.2 } else { 0.0 };
@@ -423,7 +423,7 @@ fn lobes_shaded_side_by_side_have_the_bits_of_lobes_shaded_one_by_one() {
     }
 }
 
-/// `s` with sheen and clear coat alone over what is metallic-rough, one or both, smooth and rough, their maps of so many
+/// `s` with sheen and clear coat alone on metallic-rough materials, one or both, smooth and rough, with maps of `textures`
 /// textures.
 fn overlaid(mut s: Stage, textures: u32) -> Stage {
     let map = |i, texture| lobe_map(textures, i, texture);
@@ -456,7 +456,7 @@ fn sheen_and_coat_over_points_side_by_side_have_the_bits_of_those_over_points_on
     ];
     for (k, (environment, textures, depth, env_rays)) in cases.into_iter().enumerate() {
         let stage = if textures > 0 { painted() } else { plain() };
-        // Rough glass blurs what is seen through it.
+        // Rough glass blurs the surfaces seen through it.
         let mut s = overlaid(if depth > 1 { glazed(stage, 3) } else { stage }, textures);
         // In some cases also by rays.
         s.settings.gloss_rays = (k % 2 == 1).then_some(2);
@@ -531,7 +531,7 @@ fn points_that_look_around_by_rays_have_the_same_bits_side_by_side() {
 #[test]
 fn wide_lights_light_points_side_by_side_as_they_light_them_one_by_one() {
     let sequence = Sampling::Stochastic(Stochastic { min_samples: 4, max_samples: 4, ..Stochastic::default() });
-    // Three of each light, and one of each in what mirrors show; so many that rays wait for each other more than once.
+    // Three samples of each light, and one of each seen in mirrors; so many that rays wait for each other more than once.
     for (sampling, light_rays, mut s) in [(Sampling::Uniform, 9), (sequence, 12), (Sampling::Uniform, 90)]
         .into_iter()
         .flat_map(|(sampling, rays)| [plain(), painted(), glazed(painted(), 3)].map(|stage| (sampling, rays, stage)))
@@ -541,7 +541,7 @@ fn wide_lights_light_points_side_by_side_as_they_light_them_one_by_one() {
         let kind = LightKind::Rectangle { position: DVec3::new(0.5, 3.5, 1.0), sides, falloff: Falloff::None };
         let intensity = Vec3::new(0.4, 0.3, 0.2);
         s.scene.lights.push(Light { name: String::new(), intensity, kind, shadows: true, size: 0.0 });
-        // What arrives of it waits for nothing.
+        // Its light needs no shadow rays.
         s.lamp(DVec3::new(-2.0, 3.0, 2.0), 0.2);
         s.scene.lights.last_mut().into_iter().for_each(|light| light.shadows = false);
         (s.settings.sampling, s.settings.light_rays) = (sampling, light_rays);

@@ -1,4 +1,4 @@
-//! Clear coat and grain over surfaces whose normals a map turns.
+//! Clear coat and anisotropy over surfaces with normal maps.
 
 use super::*;
 use crate::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray};
@@ -11,8 +11,8 @@ fn map() -> TextureRef {
     TextureRef { texture: 0, uv_set: 0, transform: UvTransform { offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE } }
 }
 
-/// A square that shows nothing but smooth clear coat, seen face on under a light that shines along `direction`; its base has the
-/// map of normals of these two texels, if there is one.
+/// A square that shows nothing but smooth clear coat, seen face on under a light that shines along `direction`; its base has a
+/// normal map of these two texels, if given.
 fn coated(normals: Option<[[u8; 3]; 2]>, direction: DVec3) -> Stage {
     let mut s = looking_down(3.0);
     let coat = Coat {

@@ -1,4 +1,4 @@
-//! What each pixel cost.
+//! Costs of single pixels.
 
 use super::bits::busy;
 use super::*;

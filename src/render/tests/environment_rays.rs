@@ -1,11 +1,11 @@
-//! What stands between a point and its surroundings.
+//! Occlusion of the environment, tested by rays.
 
 use super::*;
 use crate::accel::AccelKind;
 use crate::scene::{Environment, MetalRough, Panorama};
 use std::sync::Arc;
 
-/// A white floor at z = 0, looked at from just above, under a ball of radius 1 whose middle is 2 high.
+/// A white floor at z = 0, viewed from just above, under a ball of radius 1 whose centre is at height 2.
 fn under_a_ball() -> Stage {
     let mut s = looking_down(0.5);
     s.view = View::look_at(DVec3::Z * 0.5, DVec3::ZERO, DVec3::Y, Lens::orthographic(0.01));
@@ -16,7 +16,7 @@ fn under_a_ball() -> Stage {
     s
 }
 
-/// A sky of one bright texel of 512 × 256 straight up (along +z), and little else.
+/// A sky of one bright spot of 2 × 2 texels of 512 × 256 straight up (along +z), and little else; and its irradiance.
 fn sun() -> (Panorama, f32) {
     let mut texels = vec![[0.1, 0.1, 0.1]; 512 * 256];
     // +Z is a quarter to the right of the middle.
@@ -64,7 +64,7 @@ fn a_closed_room_is_dark() {
     assert_eq!(s.color(), Vec3::ZERO);
 }
 
-/// A square whose normals lean so far that a part of what they look at lies below it, in a black ball that a plane may close.
+/// A square whose normals lean so far that part of their hemisphere lies below it, beside a black ball or shut in one.
 fn leaning(shut_in: bool, samples: u32, env_rays: u32) -> Stage {
     let mut s = looking_down(0.5);
     s.view = View::look_at(DVec3::Z * 0.5, DVec3::ZERO, DVec3::Y, Lens::orthographic(0.01));
@@ -83,7 +83,7 @@ fn normals_that_lean_beyond_a_face_let_no_light_in_through_it() {
     for (samples, env_rays) in [(1, 2), (64, 2), (16, 4), (4, 16)] {
         assert_eq!(leaning(true, samples, env_rays).color(), Vec3::ZERO, "{samples} × {env_rays}");
     }
-    // However many rays a sample has, all together see the same.
+    // Whatever the number of rays per sample, the mean is the same.
     let many = leaning(false, 64, 256).color();
     assert!((0.3..0.9).contains(&many.x), "{many}");
     for (samples, env_rays) in [(8192, 2), (4096, 4), (1024, 16)] {
@@ -141,7 +141,7 @@ fn clear_glass_hides_nothing_and_coloured_glass_colours() {
     for color in [Vec3::ONE, Vec3::new(1.0, 0.5, 0.0)] {
         let mut s = under_a_ball();
         s.scene.materials[1] = material(Vec3::ZERO, Phong { transmission: color, ..phong() });
-        // Both walls of the ball filter.
+        // Both walls of the ball filter the light.
         let twice = |c: f32| 0.75 + 0.25 * c * c;
         let both = Vec3::new(twice(color.x), twice(color.y), twice(color.z));
         assert_near(s.color(), both, 0.01);

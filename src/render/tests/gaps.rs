@@ -1,4 +1,4 @@
-//! Rays pass what is known to be a gap, and pictures are the same bit by bit.
+//! Rays pass known gaps, and pictures are the same bit by bit.
 
 use super::*;
 use crate::accel::AccelChoice;
@@ -10,8 +10,8 @@ use crate::scene::{
     AlphaMode, Bitmap, Environment, MetalRough, Pixels, Sampler, Texture, TextureRef, UvTransform, Wrap,
 };
 
-/// Cards with spots on them, thick as leaves before a mirror and beside a lamp: some turn their backs, some are mirrored, some
-/// stand in one place, and their maps repeat, end, or are turned.
+/// Spotted cards, thick as leaves, before a mirror and beside a lamp: some turn their backs, some are mirrored, some coincide,
+/// and their maps repeat, clamp, mirror or are turned.
 fn canopy(alpha_mode: AlphaMode, side: u32, branching: bool) -> Stage {
     let mut random = Random::new(41);
     let view = View::look_at(DVec3::new(0.5, 0.3, 7.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.6));
@@ -36,7 +36,7 @@ fn canopy(alpha_mode: AlphaMode, side: u32, branching: bool) -> Stage {
     let texel = |x: u32, y: u32| {
         let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) / side as f32;
         let near = spots.iter().map(|spot| (at - *spot).length()).fold(9.0, f32::min);
-        // Solid, then less and less, then nothing.
+        // Solid, then fading, then clear.
         [60, 140, 40, (255.0 * (1.5 - near * 16.0)).clamp(0.0, 255.0) as u8]
     };
     let texels = (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
@@ -65,7 +65,7 @@ fn canopy(alpha_mode: AlphaMode, side: u32, branching: bool) -> Stage {
         let mirrored = DAffine3::from_scale(DVec3::new(if i % 5 == 2 { -1.0 } else { 1.0 }, 1.0, 1.0));
         let place = DAffine3::from_translation(at) * DAffine3::from_rotation_y(a) * DAffine3::from_rotation_x(b);
         s.mesh(mesh.clone(), place * mirrored, leaf);
-        // What lies in one place, of one material, is one surface where it turns the same side to a ray.
+        // Coincident cards of one material are one surface where they turn the same side to a ray.
         let (material, count) = (s.scene.materials.len() as u32 - 1, s.scene.meshes.len() as u32);
         let again = Instance { name: String::new(), mesh: count - 1, world_from_object: place * mirrored };
         match i % 9 {
@@ -103,7 +103,8 @@ fn pictures_have_the_same_bits_whether_or_not_rays_stop_at_what_is_not_there() {
     }
 }
 
-/// Rays that are not counted pass some gaps, so that fewer than such a part of all are asked, and the picture is the same.
+/// Asserts that uncounted rays pass some gaps, so that less than the fraction `most` of all queries is made, and the picture is
+/// the same.
 fn assert_passes(job: &Job, most: f64, what: &str) -> Rendered {
     let (counted, (rendered, profile)) = (render_counted(job, &()), render_profiled(job, &()));
     assert!(rendered.picture == counted.picture, "{what}");
@@ -137,8 +138,7 @@ fn what_is_kept_once_for_many_places_has_the_same_gaps_in_all_of_them() {
     }
 }
 
-/// A card whose coordinates are made of huge numbers, or that is a sliver, seen from near: what is read there depends on
-/// roundings.
+/// A card with huge coordinates, or a sliver, seen from near: the texels read there depend on rounding.
 #[test]
 fn where_roundings_decide_what_is_read_nothing_is_passed_that_is_there() {
     for case in 0..3 {

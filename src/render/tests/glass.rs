@@ -1,4 +1,4 @@
-//! Refracted rays: directions, total reflection, nesting, dispersion.
+//! Refracted rays: directions, total internal reflection, nesting, dispersion.
 
 use super::*;
 use crate::math::Vec4;
@@ -12,7 +12,7 @@ fn glass(ior: f32) -> Material {
     material(Vec3::ZERO, Phong { transmission: Vec3::ONE, ior, ..phong() })
 }
 
-/// A square that faces +z whose red is (x + half) / (2 half): what is seen of it tells where it was met.
+/// A square that faces +z whose red is (x + half) / (2 half): its colour tells where it was hit.
 fn ruler(z: f32, half: f32) -> Mesh {
     let red = |p: &Vec3| {
         Vec4::new((p.x + half) / (2.0 * half), (p.x + half) / (2.0 * half), (p.x + half) / (2.0 * half), 1.0)
@@ -61,7 +61,7 @@ fn beyond_the_critical_angle_everything_is_reflected() {
 #[test]
 fn fresnel_shares_light_between_both_branches() {
     let both = Phong { transmission: Vec3::ONE, mirror: Vec3::ONE, ior: 1.5, fresnel: true, ..phong() };
-    // Flat as it may be seen.
+    // Down to grazing angles.
     for degrees in [60.0f64, 89.0, 89.8] {
         let mut s = aslant(degrees);
         s.square(0.0, 9.0, material(Vec3::ZERO, both.clone()));
@@ -80,7 +80,7 @@ fn a_glass_ball_gathers_light_at_its_focus() {
     s.view = View::look_at(DVec3::new(0.02, 0.0, 5.0), DVec3::new(0.02, 0.0, 0.0), DVec3::Y, Lens::orthographic(1e-6));
     s.sphere(DVec3::ZERO, 1.0, glass(1.5)).mesh(ruler(-1.5, 0.02), DAffine3::IDENTITY, unlit(Vec3::ONE));
     assert!((s.color().x - 0.5).abs() < 0.01, "{}", s.color().x);
-    // Both surfaces bend: a ball that only bent once would show the ruler elsewhere.
+    // Both surfaces refract: a ball with a single refraction would show the ruler elsewhere.
     assert_eq!(s.render().counts.refracted.queries, 2);
 }
 
@@ -137,7 +137,7 @@ fn the_inside_of_a_volume_absorbs_light_by_the_length_of_the_way_through() {
             };
             s.square(z, 9.0, Material { reflection: Reflection::MetalRough(m), ..Material::default() });
         }
-        // One volume with two faces; the lower one looks down.
+        // One volume with two faces; the lower one faces down.
         s.scene.meshes[1].material = s.scene.meshes[0].material;
         s.scene.meshes[1].triangles.iter_mut().for_each(|t| t.swap(0, 1));
         s.square(-3.0, 90.0, unlit(Vec3::ONE));
@@ -199,10 +199,10 @@ fn an_eye_within_a_volume_sees_what_that_leaves_of_the_light() {
         s.sphere(DVec3::ZERO, 9.0, unlit(Vec3::ONE));
         let open = 1.0 - optics::fresnel_dielectric(1.0, f64::from(ior), 1.0) as f32;
         let left = (absorption * -1.5).exp();
-        // What is mirrored inside has come through at last: of each share as much less as its way is longer.
+        // Light reflected inside gets out in the end: each share attenuated over its longer path.
         let all = left * open / (Vec3::ONE - left * left * (1.0 - open));
         assert_near(s.color(), all, 1e-4);
-        // A pane that one sees from behind is no volume.
+        // A pane seen from behind is no volume.
         let mut s = looking_down(3.0);
         s.square(0.0, 9.0, clear(1.0, true, absorption));
         s.scene.meshes[0].triangles.iter_mut().for_each(|t| t.swap(0, 1));
@@ -223,7 +223,7 @@ fn a_prism_splits_white_light_and_bends_blue_more() {
     let (color, rays) = split(0.0);
     assert!(color.x == color.z && rays == 1);
     let (color, rays) = split(0.5);
-    // Blue is bent towards the normal, so it meets the ruler nearer the middle.
+    // Blue is refracted more, so it hits the ruler nearer the middle.
     assert!(color.z < color.y && color.y < color.x && rays == 12, "{color} {rays}");
 }
 
@@ -234,7 +234,7 @@ fn a_white_scene_seen_through_a_prism_stays_white() {
     s.square(0.0, 9.0, material(Vec3::ZERO, prism));
     s.scene.environment = Environment::Constant(Vec3::ONE);
     assert_near(s.color(), Vec3::ONE, 1e-5);
-    // What is mirrored is as much of each wavelength as is not let in.
+    // At each wavelength reflection and transmission sum to 1.
     let mirror =
         Phong { transmission: Vec3::ONE, mirror: Vec3::ONE, fresnel: true, ior: 1.6, dispersion: 5.0, ..phong() };
     s.scene.materials[0] = material(Vec3::ZERO, mirror);
@@ -252,7 +252,7 @@ fn a_light_behind_frosted_phong_glass_shines_through() {
     assert!(beside > 0.0 && beside < 0.4);
 }
 
-/// Light arrives at the inside of a wall bent; straight on, it would be added at each of hundreds of reflections.
+/// Light arrives refracted at the inside of a wall; straight on, it would be added at each of hundreds of reflections.
 #[test]
 fn a_lamp_is_seen_in_glass_from_outside_and_in_no_wall_from_inside() {
     let phong = Phong { specular: Vec3::ONE, shininess: 8.0, transmission: Vec3::ONE, ior: 1.5, ..phong() };
@@ -265,7 +265,7 @@ fn a_lamp_is_seen_in_glass_from_outside_and_in_no_wall_from_inside() {
         s.square(0.0, 9.0, glass).lamp(DVec3::Z * 4.0, 20.0);
         s.settings.depth = Some(0);
         assert!(s.color().x > 0.05, "{:?}", s.color());
-        // Now what is before the eye is the inside.
+        // Now the eye faces the inside.
         s.scene.meshes[0].triangles.iter_mut().for_each(|t| t.swap(0, 1));
         assert_eq!(s.color(), Vec3::ZERO);
     }
@@ -294,14 +294,14 @@ fn a_hundred_plates_of_glass_shift_a_ray_and_leave_its_direction() {
     };
     let expected = |wall: f64| 0.1 * tangent(sine / ior) + (wall - 0.1) * tangent(sine);
     let (near, far) = (at_wall(-1.0), at_wall(-9.0));
-    // Colours tell places to 2⁻²⁴ of 32.
+    // Colours resolve positions to 2⁻²⁴ of 32.
     assert!((near - expected(1.0)).abs() < 1e-5, "{near} for {}", expected(1.0));
     let ulp = f64::from(f32::EPSILON);
     assert!((far - near - 8.0 * tangent(sine)).abs() < 200.0 * ulp * 8.0, "{far} {near}");
 }
 
-/// Where a ray 0.3 beside the middle of spheres within each other, (radius, index) from the outermost on, meets a plane 6
-/// below it: what is seen there, and what should be; and how many rays were refracted.
+/// Where a ray 0.3 beside the centre of concentric spheres, (radius, index) from the outermost on, hits a plane 6 below it: the
+/// position found and the expected one, and the number of refracted rays.
 fn through_spheres(spheres: &[(f64, f32)]) -> (f64, f64, u64) {
     let impact = 0.3f64;
     let mut s = looking_down(5.0);
@@ -312,12 +312,12 @@ fn through_spheres(spheres: &[(f64, f32)]) -> (f64, f64, u64) {
     }
     s.settings.depth = Some(64);
     s.mesh(ruler(-6.0, 8.0), DAffine3::IDENTITY, unlit(Vec3::ONE));
-    // n r sin θ is constant along the way through spheres around one centre (P. Bouguer, 1729).
+    // n r sin θ is constant along a path through concentric spheres (P. Bouguer, 1729).
     let angle = |n: f32, r: f64| libm::asin(impact / (f64::from(n) * r));
     let outside = std::iter::once(1.0).chain(spheres.iter().map(|&(_, ior)| ior));
     let turned = |(n, &(r, ior)): (f32, &(f64, f32))| 2.0 * (angle(n, r) - angle(ior, r));
     let turned: f64 = outside.zip(spheres).map(turned).sum();
-    // The way is symmetric: it comes out at distance `impact` from the line through the centre turned by that angle.
+    // The path is symmetric: it comes out at distance `impact` from the line through the centre turned by that angle.
     let x = (impact - 6.0 * libm::sin(turned)) / libm::cos(turned);
     (f64::from(s.color().x) * 16.0 - 8.0, x, s.render().counts.refracted.queries)
 }
@@ -325,7 +325,7 @@ fn through_spheres(spheres: &[(f64, f32)]) -> (f64, f64, u64) {
 /// S12 (nesting): each boundary has the indices of its two sides, however deep it lies.
 #[test]
 fn bodies_within_bodies_bend_as_snells_law_says_at_every_boundary() {
-    // Water in a glass shell in air; and a dozen bodies, of kinds that alternate and of one.
+    // Water in a glass shell in air; and a dozen nested bodies, of alternating indices and of one index.
     let spheres = |ior: [f32; 2]| (0..12).map(move |i| (2.0 - 0.1 * f64::from(i), ior[i as usize % 2]));
     let water = vec![(2.0, 1.5), (1.0, 1.33)];
     for spheres in [water, spheres([1.5, 1.1]).collect(), spheres([1.3, 1.3]).collect()] {
@@ -335,7 +335,7 @@ fn bodies_within_bodies_bend_as_snells_law_says_at_every_boundary() {
     }
 }
 
-/// S15 (furnace): what smooth glass and mirrors reflect and transmit adds up to what there is.
+/// S15 (furnace): reflection and transmission of smooth glass and mirrors sum to the light that arrives.
 #[test]
 fn glass_and_mirrors_in_an_evenly_bright_room_cannot_be_seen() {
     let both = Phong { transmission: Vec3::ONE, mirror: Vec3::ONE, ior: 1.5, fresnel: true, ..phong() };
@@ -351,7 +351,7 @@ fn glass_and_mirrors_in_an_evenly_bright_room_cannot_be_seen() {
     let seen: Vec<_> = rendered.picture.beauty.iter().filter(|p| p[3] > 0.0).collect();
     assert!(seen.len() > 100);
     for pixel in seen {
-        // What is still inside after so many bounces, where it grazes the ball, is left in the dark.
+        // Light still inside after so many bounces, at grazing hits of the ball, is lost.
         assert_near(Vec3::from_slice(pixel), Vec3::ONE, 1e-6 * depth as f32);
     }
 }
@@ -370,7 +370,7 @@ fn glass_that_mirrors_and_passes_all_light_at_once_has_no_endless_tree_of_rays()
     let rendered = s.render();
     let rays = rendered.counts.refracted.queries + rendered.counts.reflected.queries;
     assert!(rays > 1000 && rays < 100_000, "{rays}");
-    // Less is seen than there is by what the ends of branches leave in the dark.
+    // The ends of branches lose some light.
     let seen: Vec<_> = rendered.picture.beauty.iter().filter(|p| p[3] > 0.0).map(|p| p[0]).collect();
     assert!(seen.len() > 8 && seen.iter().all(|light| (0.5..1.0 + 1e-5).contains(light)), "{seen:?}");
 }
@@ -514,7 +514,7 @@ fn an_eye_within_bodies_of_one_material_leaves_each_of_them() {
     s.scene.environment = Environment::Constant(Vec3::ONE);
     s.settings.cutoff = 0.1;
     let counts = s.render().counts;
-    // Straight through the inner wall, and a little is mirrored at the outer one.
+    // Straight through the inner wall, and a little is reflected at the outer one.
     assert_eq!((counts.primary.queries, counts.reflected.queries, counts.refracted.queries), (1, 0, 2));
     assert!((s.color().x - 0.96).abs() < 2e-3, "{}", s.color().x);
 }
@@ -532,7 +532,7 @@ fn cube(half: f32) -> Mesh {
 
 #[test]
 fn walls_that_are_met_on_their_edges_and_corners_are_left_once() {
-    // Looked at from the middle along diagonals of a side and of the cubes.
+    // The directions run along diagonals of the cubes and of their sides.
     let mut s = looking_down(0.0);
     s.view = View::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, Lens::orthographic(1.0));
     let around = |s: &Stage| {
@@ -553,7 +553,7 @@ fn an_eye_in_glass_behind_more_walls_than_are_looked_through_is_still_in_it() {
     let both = Phong { transmission: Vec3::ONE, mirror: Vec3::ONE, ior: 1.8, fresnel: true, ..phong() };
     s.square(0.0, 9.0, material(Vec3::ZERO, both)).square(-3.0, 99.0, unlit(Vec3::X));
     s.sphere(DVec3::ZERO, 100.0, glass(1.33));
-    // Behind what is seen.
+    // Behind the visible square.
     for i in 0..1100 {
         s.square(-4.0 - 0.01 * f64::from(i) as f32, 1.0, unlit(Vec3::Y));
     }

@@ -1,10 +1,10 @@
-//! Lights seen in small bright spots, which few rays meet.
+//! Narrow highlights of lights, which few rays hit.
 
 use super::round::ball;
 use super::*;
 use crate::scene::MetalRough;
 
-/// A smooth metal ball of this radius, in the picture of one pixel of side 1 somewhere off its middle, under one light.
+/// A smooth metal ball of this radius in a picture of one pixel of side 1, off its middle, under one light.
 fn mirror_ball(radius: f64, at: DVec3, place: impl FnOnce(&mut Stage, f64, DVec3, Material)) -> Stage {
     let mut s = looking_down(3.0);
     let metal = MetalRough { metallic: 1.0, roughness: 0.0, ..MetalRough::default() };
@@ -27,7 +27,7 @@ fn meshed(s: &mut Stage, radius: f64, at: DVec3, material: Material) {
 
 #[test]
 fn a_light_in_a_ball_smaller_than_a_pixel_is_as_bright_as_the_ball_makes_it_and_met_by_few_rays() {
-    // A mirror ball sends light to all sides alike: its intensity is irradiance · radius² / 4.
+    // A mirror ball reflects light uniformly in all directions: its intensity is irradiance · radius² / 4.
     let offsets = [(0.0, 0.0), (0.07, 0.03), (-0.05, 0.09), (0.02, -0.11)];
     for (name, place) in [("exact", exact as fn(&mut Stage, f64, DVec3, Material)), ("meshed", meshed)] {
         for radius in [0.3, 0.38] {
@@ -47,7 +47,7 @@ fn a_light_in_a_ball_smaller_than_a_pixel_is_as_bright_as_the_ball_makes_it_and_
 
 #[test]
 fn a_light_in_a_large_ball_is_no_wider_than_it_was() {
-    // Where hundreds of pixels cross the ball, what is added is less than a roughness of 0.1 is.
+    // Where hundreds of pixels cross the ball, the highlight is widened by less than a roughness of 0.1.
     let mut s = mirror_ball(200.0, DVec3::new(0.0, 0.0, -200.0), exact);
     let kind = LightKind::Directional { direction: DVec3::NEG_Z };
     s.scene.lights[0].kind = kind;

@@ -1,4 +1,4 @@
-//! Rough surfaces whose rays are spread over what they mirror and let through.
+//! Rough surfaces with spread rays for reflection and transmission.
 
 use super::*;
 use crate::accel::AccelKind;
@@ -19,8 +19,7 @@ fn metal(roughness: f32) -> Material {
     rough(MetalRough { metallic: 1.0, roughness, ..MetalRough::default() })
 }
 
-/// A floor of white metal at z = 0, looked at straight down from below a ball of radius 1 whose middle is 2 high and
-/// which glows.
+/// A floor of white metal at z = 0, viewed straight down from below a glowing ball of radius 1 whose centre is at height 2.
 fn under_a_ball(roughness: f32) -> Stage {
     let mut s = looking_down(0.5);
     s.view = View::look_at(DVec3::Z * 0.5, DVec3::ZERO, DVec3::Y, Lens::orthographic(0.01));
@@ -32,7 +31,7 @@ fn under_a_ball(roughness: f32) -> Stage {
 #[test]
 fn a_rough_mirror_shows_what_the_lobe_sees() {
     for roughness in [0.1f32, 0.3, 0.5] {
-        // Facets within 15° of the normal send the view into the ball, which reaches 30° out from straight above.
+        // Facets within 15° of the normal mirror the view into the ball, which reaches 30° out from straight above.
         let tan_squared = libm::tanf(15f32.to_radians()).powi(2);
         let seen = tan_squared / (tan_squared + roughness.powi(4));
         let color = under_a_ball(roughness).color();
@@ -167,7 +166,7 @@ fn what_lets_no_light_in_does_not_disperse_it() {
     }
 }
 
-/// What a white furnace shows of a thing of this glass.
+/// Radiance of a square of this glass in a white furnace.
 fn in_a_furnace(glass: MetalRough, from: f64, rays: Option<u32>) -> f32 {
     let mut s = looking_down(from);
     s.square(0.0, 9.0, rough(glass));

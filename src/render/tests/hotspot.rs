@@ -1,4 +1,4 @@
-//! The sun of a panorama in rough mirrors and behind frosted glass, and what else rays that are spread seldom meet.
+//! The sun of a panorama in rough mirrors and behind frosted glass, and other small lights that spread rays seldom hit.
 
 use super::*;
 use crate::render::sampling::{Sampling, Stochastic};
@@ -7,7 +7,7 @@ use crate::scene::{Background, Environment, MetalRough, Panorama};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-/// A sky of .1 with a sun of so many texels of 512 × 256 each way, straight up (along +z); the sun's radiance, and sr.
+/// A sky of .1 with a square sun, `texels` of 512 × 256 wide, straight up (along +z); also its radiance and solid angle, sr.
 fn sun(texels: usize) -> (Panorama, f32, f32) {
     const RADIANCE: f32 = 3000.0;
     let mut all = vec![[0.1; 3]; 512 * 256];
@@ -40,14 +40,14 @@ fn frosted(roughness: f32) -> Material {
     rough(MetalRough { metallic: 0.0, transmission: 1.0, roughness, ..MetalRough::default() })
 }
 
-/// How densely a lobe that is seen along its normal sends rays to where a mirror would, 1/sr.
+/// Density of rays in the mirror direction, for a lobe viewed along its normal, 1/sr.
 fn density(roughness: f32) -> f32 {
     1.0 / (4.0 * PI * roughness.powi(4))
 }
 
 #[test]
 fn four_rays_see_the_sun_in_a_rough_mirror_as_bright_as_all_of_its_facets_do() {
-    // Rougher ones mirror light of several facets, too, which a formula adds.
+    // Rougher ones also reflect light of several facets, which a formula adds.
     for roughness in [0.2, 0.3, 0.5] {
         let (sky, radiance, area) = sun(2);
         let mut s = under(sky, 0.5);
@@ -59,7 +59,7 @@ fn four_rays_see_the_sun_in_a_rough_mirror_as_bright_as_all_of_its_facets_do() {
 
 #[test]
 fn what_facets_would_send_to_the_wrong_side_is_sent_to_the_right_one_in_sight_of_the_sun_too() {
-    // Suns of a little less than what a hotspot may be and of a little more, which only rays that are spread see.
+    // Suns slightly smaller than the limit of a hotspot, and slightly larger, which only spread rays see.
     let light = |texels: usize, rays: u32, material: Material, from: DVec3| {
         let (sky, radiance, area) = sun(texels);
         let mut s = under(sky, 1.0);
@@ -95,7 +95,7 @@ fn backs_that_nobody_sees_hide_no_sun_from_a_rough_mirror() {
     assert!(seen(Some(false)) < 0.2 * open);
 }
 
-/// What a frosted pane lets through, seen from straight before it.
+/// Transmittance of a frosted pane, viewed face on.
 fn let_through(roughness: f32) -> f32 {
     let mut s = looking_down(-0.5);
     s.square(0.0, 9.0, frosted(roughness)).plane(DVec3::Z, 5.0, unlit(Vec3::ONE));
@@ -133,7 +133,7 @@ fn what_covers_in_part_halves_a_sun_and_glass_shows_it_to_the_rays_that_are_spre
         s.square(1.0, 9.0, half.clone());
     });
     assert!((veiled / open - 0.5).abs() < 0.02, "{veiled} of {open}");
-    // A slab whose faces are parallel lets rays out as they came, less what both mirror.
+    // A slab with parallel faces does not turn rays; both faces reflect a part.
     let slab = rough(MetalRough {
         metallic: 0.0,
         transmission: 1.0,
@@ -145,7 +145,7 @@ fn what_covers_in_part_halves_a_sun_and_glass_shows_it_to_the_rays_that_are_spre
     let bent = shown(&|s| {
         let (mut both, far) = (square(1.0, 9.0), square(1.5, 9.0));
         both.positions.extend(far.positions);
-        // The near one faces the eye.
+        // The near face is turned to the eye.
         both.triangles = vec![[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]];
         s.mesh(both, DAffine3::IDENTITY, slab.clone());
     });
@@ -179,7 +179,7 @@ fn the_sun_of_a_dim_sky_is_as_much_brighter_than_the_rest_as_that_of_a_bright_on
     assert!((dim / bright - 1.0).abs() < 1e-5, "{dim} for {bright}");
 }
 
-/// A frosted pane, and behind it a thing of glass that rays pass as they come.
+/// A frosted pane with a glass object behind it that does not turn rays.
 fn before_glass(thing: MetalRough, opacity: f32) -> Stage {
     let (sky, ..) = sun(10);
     let mut s = under(sky, -0.5);
@@ -218,7 +218,7 @@ fn a_sun_behind_glass_is_seen_alike_by_points_one_by_one_and_side_by_side() {
     }
 }
 
-/// Mean of a picture as it is written, and of one that has so many samples in every pixel.
+/// Mean of a picture with default stochastic sampling, and of one with `samples` in every pixel.
 fn means(s: &mut Stage, samples: u32) -> [f64; 2] {
     let mean = |s: &Stage| {
         let picture = s.with_job(AccelKind::DEFAULT, |job| render(job, &())).picture;

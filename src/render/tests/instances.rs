@@ -1,4 +1,4 @@
-//! Meshes that are stored once look as if each instance were stored by itself.
+//! Instanced meshes look as if each instance were stored by itself.
 
 use super::*;
 use crate::accel::{AccelChoice, RayCounts};
@@ -7,8 +7,8 @@ use crate::math::{DMat3, Vec2};
 use crate::render::{Instancing, Sampling, Stochastic};
 use crate::scene::{AlphaMode, MetalRough};
 
-/// Objects of three meshes in front of a mirror: one mesh lets light through, and one has normals and colours; they are
-/// turned, stretched, mirrored and sheared, one is flat. Beside them a sphere, a plane and a mesh that is seen once.
+/// Objects of three meshes in front of a mirror: one mesh lets light through, one has normals and colours; they are turned,
+/// stretched, mirrored and sheared, one is flat. Beside them a sphere, a plane and a mesh that is used once.
 fn scene() -> Stage {
     let view = View::look_at(DVec3::new(2.0, -7.0, 4.0), DVec3::ZERO, DVec3::Z, Lens::perspective(0.7));
     let mut stage = stage(view);
@@ -59,7 +59,7 @@ fn place(matrix3: DMat3, translation: DVec3) -> DAffine3 {
     DAffine3 { matrix3, translation }
 }
 
-/// The picture with all layers, counted, and how many instances were kept.
+/// The picture with all layers, counted, and the number of instances kept.
 fn rendered(stage: &Stage, how: Instancing, kind: AccelKind) -> (Rendered, usize) {
     let world = World::placing(&stage.scene, how);
     let (accel, _) = world.structure(AccelChoice::Kind(kind), &AccelParams::DEFAULT);
@@ -92,7 +92,7 @@ fn a_picture_and_its_layers_are_the_same_bits_whether_or_not_instances_are_kept(
 
 #[test]
 fn what_is_known_to_stop_light_changes_no_bit() {
-    // A round mesh of which some faces are see-through: of kept ones it is not known which, and of nothing if all is done.
+    // A round mesh with some see-through faces: of kept instances it is unknown which faces, and without pruning of all.
     let mut stage = scene();
     stage.scene.materials[0].alpha_mode = AlphaMode::Blend;
     let star = &mut stage.scene.meshes[0];
@@ -122,7 +122,7 @@ fn what_is_known_to_stop_light_changes_no_bit() {
 
 #[test]
 fn ways_up_from_round_surfaces_meet_the_same_whether_or_not_instances_are_kept() {
-    // Under leaves of which some faces are see-through, within the bulge that the normals of a square describe; seen from aside.
+    // Under leaves with some see-through faces, within the bulge that the normals of a square describe; seen from aside.
     let eye = DVec3::new(0.0, -6.0, 0.35);
     let mut stage = stage(View::look_at(eye, DVec3::ZERO, DVec3::Z, Lens::perspective(0.3)));
     stage.settings = Settings { width: 96, height: 48, samples: 4, ..Settings::default() };

@@ -1,14 +1,14 @@
-//! Light that is scattered through thin surfaces.
+//! Diffuse transmission through thin surfaces.
 
 use super::*;
 use crate::scene::{DiffuseTransmission, Environment, MetalRough};
 
 const BASE: Vec3 = Vec3::new(0.8, 0.4, 0.2);
 const THROUGH: Vec3 = Vec3::new(0.1, 0.9, 0.3);
-/// Of what is scattered, so much goes through.
+/// Share of the scattered light that passes through.
 const SHARE: f32 = 0.25;
 
-/// A surface that reflects nothing at its face, so that all light is scattered.
+/// A surface without Fresnel reflection, so that all light is scattered.
 fn leaf(share: f32) -> Material {
     let diffuse_transmission = (share > 0.0)
         .then(|| Box::new(DiffuseTransmission { share, share_map: None, color: THROUGH, color_map: None }));
@@ -16,7 +16,7 @@ fn leaf(share: f32) -> Material {
     Material { base_color: BASE, double_sided: true, reflection: Reflection::MetalRough(dull), ..Material::default() }
 }
 
-/// A leaf at z = 0, seen from above, in an even light of 1 from everywhere.
+/// A leaf at z = 0, seen from above, in constant light of radiance 1 from everywhere.
 fn in_the_open(share: f32) -> Stage {
     let mut s = looking_down(0.5);
     s.square(0.0, 1.0, leaf(share));
@@ -34,7 +34,7 @@ fn a_lamp_behind_a_leaf_shines_through_in_its_colour() {
     let opaque = lit(0.0, 5.0);
     assert!(opaque.min_element() > 0.0 && lit(0.0, -5.0) == Vec3::ZERO);
     assert_near(lit(SHARE, 5.0), opaque * (1.0 - SHARE), 1e-6);
-    // The opaque leaf is lit in its base colour, so that what is left without it is the light itself.
+    // The opaque leaf is lit in its base colour; divided by that, it gives the light itself.
     assert_near(lit(SHARE, -5.0), opaque / BASE * THROUGH * SHARE, 1e-6);
 }
 

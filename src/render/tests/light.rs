@@ -3,7 +3,7 @@
 use super::*;
 use crate::scene::{AlphaMode, Environment, MetalRough};
 
-/// The point of a unit sphere seen by pixel (x, y) of a `size` × `size` picture two units high.
+/// Point of a unit sphere seen by pixel (x, y) of a `size` × `size` picture two units high.
 fn on_unit_sphere(x: u32, y: u32, size: u32) -> Vec3 {
     let place = |i: u32| (i as f32 + 0.5) / size as f32 * 2.0 - 1.0;
     let (x, y) = (place(x), -place(y));
@@ -72,7 +72,7 @@ fn two_colored_filters_multiply() {
     s.square(0.0, 9.0, material(Vec3::ONE, phong())).lamp(DVec3::new(4.0, 0.0, 3.0), 1.0);
     s.sphere(DVec3::new(2.0, 0.0, 1.5), 0.5, filter(Vec3::new(0.5, 1.0, 0.2)));
     s.square(1.0, 2.0, filter(Vec3::new(0.5, 0.5, 0.0)));
-    // The square hides the wall from the eye nowhere near the middle: look from beside.
+    // The square must not hide the middle of the wall from the eye.
     s.scene.meshes[1].positions.iter_mut().for_each(|p| p.y = p.y.clamp(-0.5, 0.5));
     assert_near(s.color(), 0.6 * Vec3::new(0.125, 0.5, 0.0), 1e-6);
 }

@@ -120,7 +120,7 @@ fn rays_leave_a_mirror_that_stands_far_from_the_origin() {
     assert_eq!(picture.beauty[0], [0.5, 0.5, 0.5, 1.0], "the mirror does not see itself");
 }
 
-/// S6 (drift): between two mirrors a ray comes along by the same step at each of fifty bounces.
+/// S6 (drift): between two mirrors a ray advances by the same step at each of fifty bounces.
 #[test]
 fn fifty_bounces_between_mirrors_do_not_drift() {
     use crate::math::Vec4;
@@ -129,7 +129,7 @@ fn fifty_bounces_between_mirrors_do_not_drift() {
         View::look_at(DVec3::new(0.0, 0.0, 0.5), DVec3::new(1.0, 0.0, 0.5 + rise), DVec3::Y, Lens::orthographic(1e-6));
     let mut s = stage(view);
     s.square(0.0, 400.0, mirror(1.0)).square(1.0, 400.0, mirror(1.0));
-    // A wall across the way, lit by its height: bounces lie 1/rise apart, the first after half of that.
+    // A wall across the path, coloured by its height: bounces lie 1/rise apart, the first after half of that.
     let wall = (f64::from(bounces) + 0.3) / rise;
     let corner = |y: f32, z: f32| (Vec3::new(wall as f32, y, z), Vec4::new(z, z, z, 1.0));
     let (positions, colors) =
@@ -138,12 +138,12 @@ fn fifty_bounces_between_mirrors_do_not_drift() {
     s.mesh(mesh, DAffine3::IDENTITY, material(Vec3::ONE, phong()));
     s.scene.materials[2] = Material { reflection: Reflection::Unlit, ..s.scene.materials[2].clone() };
     s.settings.depth = Some(60);
-    // Unfolded, the way is straight: its height is folded into 0..1.
+    // Unfolded, the path is straight: its height is folded into 0..1.
     let height = (0.5 + rise * f64::from(wall as f32)) % 2.0;
     let expected = if height > 1.0 { 2.0 - height } else { height };
     let found = f64::from(s.color().x);
     assert_eq!(s.render().counts.reflected.queries, u64::from(bounces));
-    // 8 ulp of the largest coordinate on the way, for each bounce, and the direction's rounding over the whole way.
+    // 8 ulp of the largest coordinate on the path, for each bounce, and the rounding of the direction over the whole path.
     let ulp = f64::from(f32::EPSILON) * wall;
     assert!((found - expected).abs() < 8.0 * 50.0 * ulp, "{found} for {expected}");
 }

@@ -29,7 +29,7 @@ use crate::accel::{AccelKind, AccelParams, AnyAccel};
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::scene::{Falloff, Instance, Light, LightKind, Material, Mesh, Phong, Plane, Reflection, Scene, Sphere};
 
-/// A scene under construction and how to look at it.
+/// A scene under construction, with its view and settings.
 struct Stage {
     scene: Scene,
     view: View,
@@ -48,7 +48,7 @@ fn stage(view: View) -> Stage {
     Stage { scene: Scene::default(), view, settings }
 }
 
-/// A Phong surface that shows nothing until told otherwise.
+/// A Phong surface that reflects nothing by default.
 fn phong() -> Phong {
     Phong::default()
 }
@@ -79,7 +79,7 @@ impl Stage {
         self
     }
 
-    /// A mesh in its place; its material index is filled in.
+    /// Adds a mesh with its instance; its material index is filled in.
     fn mesh(&mut self, mesh: Mesh, world_from_object: DAffine3, material: Material) -> &mut Self {
         let material = self.add_material(material);
         self.scene.meshes.push(Mesh { material, ..mesh });
@@ -88,12 +88,12 @@ impl Stage {
         self
     }
 
-    /// A square of side 2·`half` that faces +z at height `z`.
+    /// Adds a square of side 2·`half` that faces +z at height `z`.
     fn square(&mut self, z: f32, half: f32, material: Material) -> &mut Self {
         self.mesh(square(z, half), DAffine3::IDENTITY, material)
     }
 
-    /// A lamp of strength `intensity` that does not weaken.
+    /// Adds a point light of strength `intensity` without falloff.
     fn lamp(&mut self, position: DVec3, intensity: f32) -> &mut Self {
         let kind = LightKind::Point { position, falloff: Falloff::None };
         let intensity = Vec3::splat(intensity);

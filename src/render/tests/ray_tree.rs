@@ -1,4 +1,4 @@
-//! The tree of rays of a sample, as it is told.
+//! The recorded ray tree of a sample.
 
 use super::bits::busy;
 use super::*;
@@ -11,7 +11,7 @@ fn ray_tree(stage: &Stage, kind: AccelKind, pixel: (u32, u32), sample: u32) -> R
     stage.with_job(kind, |job| tell(job, pixel, sample)).expect("there is such a pixel")
 }
 
-/// Everything but what depends on the structure.
+/// All results that do not depend on the structure.
 fn answers(ray_tree: &RayTree) -> Vec<impl PartialEq + std::fmt::Debug + use<>> {
     let hit = |q: &Query| if q.question == Question::Occluded { [0; 2] } else { [q.hit.t.to_bits(), q.hit.prim] };
     let of = |q: &Query| (q.class, q.question, hit(q), q.hit.is_some(), q.children.clone());

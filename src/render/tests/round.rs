@@ -1,9 +1,9 @@
-//! Coarse meshes that stand for something round.
+//! Coarse meshes with vertex normals, which stand for round surfaces.
 
 use super::*;
 use crate::render::ray_tree::{Class, tell};
 
-/// A ball of radius 1 about the y axis with so many faces around and from pole to pole, and its own normals.
+/// A ball of radius 1 about the y axis with this many faces around and from pole to pole, and its exact normals.
 pub(super) fn ball(around: u32, down: u32) -> Mesh {
     let mut positions = Vec::new();
     for row in 0..=down {
@@ -32,7 +32,7 @@ fn matt() -> Material {
     material(Vec3::ONE, phong())
 }
 
-/// `ball` from +z, lit by a sun.
+/// A view of the ball `mesh` from +z, lit by a sun.
 fn lit_ball(mesh: Mesh, to_sun: DVec3) -> Stage {
     let mut s = looking_down(5.0);
     s.view = View::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, Lens::orthographic(2.0));
@@ -54,7 +54,7 @@ fn sun(s: &mut Stage, to_sun: DVec3) {
     }];
 }
 
-/// The cosine between the sun and the interpolated normal of each pixel, and what the pixel shows; where the mesh is.
+/// Cosine between the sun and the interpolated normal of each pixel on the mesh, and the pixel's value.
 fn cosines(s: &mut Stage, to_sun: DVec3) -> Vec<(f32, f32)> {
     s.settings.layers = true;
     let picture = s.render().picture;

@@ -1,4 +1,4 @@
-//! Adaptive and stochastic sampling: what they see, what they cost, and whether they keep what they promise.
+//! Adaptive and stochastic sampling: results, costs, and kept promises.
 
 use super::*;
 use crate::image::diff::{Space, compare};
@@ -11,7 +11,7 @@ use crate::render::{
 };
 use crate::scene::Background;
 
-/// As it was published.
+/// Adaptive sampling as published.
 fn adaptive(threshold: f32, levels: u32) -> Sampling {
     Sampling::Adaptive(Adaptive { threshold, levels, ..Adaptive::usual(Split::Corners) })
 }
@@ -20,7 +20,7 @@ pub(super) fn stochastic(error: f32, max_samples: u32) -> Stochastic {
     Stochastic { error, max_samples, ..Stochastic::default() }
 }
 
-/// One pixel, x and y from 0 to 1, of which everything left of `edge` is white.
+/// One pixel, x and y from 0 to 1, that is white left of `edge`.
 fn edge(edge: f64) -> Stage {
     let mut s = looking_down(1.0);
     let at = DAffine3::from_translation(DVec3::X * (edge - 2.5));
@@ -56,7 +56,7 @@ fn a_pixel_is_the_mean_of_its_quadrants_and_a_quadrant_that_differs_one_of_its_o
     let mut s = edge(0.4);
     s.settings.sampling = adaptive(0.1, 8);
     assert_near(s.color(), Vec3::splat(0.4), 0.003);
-    // Less than the threshold is no difference.
+    // Differences below the threshold are ignored.
     s.settings.sampling = adaptive(1.5, 8);
     assert_eq!(s.color(), Vec3::splat(0.25));
 }
@@ -76,7 +76,7 @@ fn corners_belong_to_all_pixels_around_them() {
     assert!(finer > 0 && finer <= 10 * 2 * 3, "{finer}");
 }
 
-/// Pixels with a speck each, so much of a pixel wide (less than half), between the corners and the middle.
+/// Pixels with a speck each, `size` of a pixel wide (less than half), between the corners and the middle.
 fn specks(size: f32) -> Stage {
     let mut s = looking_down(1.0);
     let side = 12;
@@ -101,7 +101,7 @@ fn specks_between_the_five_rays_are_missed_by_adaptive_sampling_and_seen_by_stoc
     assert_eq!(mean(&s.render()), 0.0, "the weakness of the five rays");
     s.settings.sampling = Sampling::Stochastic(stochastic(0.05, 1024));
     let seen = mean(&s.render());
-    // Of the 0.04 that there is, what was not missed by all rays of a pixel.
+    // Of the true 0.04, the part that at least one ray of its pixel hit.
     assert!((0.02..0.045).contains(&seen), "{seen}");
 }
 
@@ -124,26 +124,26 @@ fn a_wire_thinner_than_a_pixel_is_followed_from_where_a_single_ray_meets_it() {
         let wrong = |seed| columns(min_samples, seed).iter().filter(|seen| !(0.12..0.28).contains(*seen)).count();
         (0..10).map(wrong).sum()
     };
-    // Of 600. Were no pixel reopened farther than two from a thin one, it would be 48.
+    // Out of 600. If pixels were reopened no farther than two from a thin detail, it would be 48.
     let (by_one, by_two, by_four) = (missed(1), missed(2), missed(4));
     assert!(by_one <= 36 && by_two <= 36 && by_four <= 12, "{by_one} {by_two} {by_four}");
 }
 
 #[test]
 fn a_lucky_start_is_caught_by_what_neighbours_saw() {
-    // So few rays each that most pixels see nothing of their speck at first.
+    // So few rays each that most pixels miss their speck at first.
     let mut s = specks(0.2);
     let how = Stochastic { min_samples: 4, ..stochastic(0.05, 1024) };
     s.settings.sampling = Sampling::Stochastic(how);
     let rendered = s.render();
     let given_up = rendered.sampled.counts.iter().filter(|&&n| n == 4).count();
-    // By chance (1 − 0.04)⁴ = 85 % of 144 pixels see nothing in four rays.
+    // By chance (1 − 0.04)⁴ = 85 % of 144 pixels miss it with four rays.
     assert!(given_up < 60, "{given_up}");
 }
 
 #[test]
 fn a_speck_before_ground_that_is_not_quite_even_is_looked_for_as_one_before_even_ground_is() {
-    // Samples that all miss the speck differ by next to nothing: that is no proof that it is not there.
+    // Samples that all miss the speck hardly differ: that does not prove that there is none.
     let mut s = specks(0.34);
     s.plane(DVec3::Z, -1.0, material(Vec3::splat(0.1), phong()));
     let kind = LightKind::Point { position: DVec3::new(9.0, 3.0, 6.0), falloff: Falloff::None };
@@ -153,7 +153,7 @@ fn a_speck_before_ground_that_is_not_quite_even_is_looked_for_as_one_before_even
     let truth = codes(&s);
     s.settings.sampling = Sampling::Stochastic(Stochastic { min_samples: 4, ..stochastic(0.02, 1024) });
     let wrong = codes(&s).iter().zip(&truth).filter(|(a, b)| (*a - *b).abs() > 0.02).count();
-    // A twentieth may be wrong; by chance (1 − 0.34²)¹⁶ = 14 % of 144 pixels see nothing of the speck in sixteen rays.
+    // A twentieth may be wrong; by chance (1 − 0.34²)¹⁶ = 14 % of 144 pixels miss the speck with sixteen rays.
     assert!(wrong <= 8, "{wrong}");
 }
 
@@ -175,7 +175,7 @@ fn what_is_flat_costs_the_fewest_rays_and_what_is_not_costs_more() {
 fn a_tent_reaches_into_the_next_pixel_and_a_box_does_not() {
     let seen = |filter, edge_at: f64| {
         let mut s = edge(edge_at);
-        // No neighbour of the only pixel tells what four rays may miss.
+        // The only pixel has no neighbours to reveal what four rays miss.
         s.settings.sampling = Sampling::Stochastic(Stochastic { filter, min_samples: 256, ..stochastic(0.001, 4096) });
         s.color().x
     };
@@ -267,11 +267,11 @@ fn one_light_ray_a_sample_finds_the_brightness_that_many_find() {
     assert_near(s.color(), expected, 0.006);
 }
 
-/// What became of the pixels of a picture that the criterion stopped after estimating a variance that is not 0.
+/// Statistics of the pixels that the criterion stopped after estimating a variance other than 0.
 struct InstancedObjects {
     stopped: usize,
     within: usize,
-    /// Pixels whose error is less than a quarter of what was asked, and the share of all rays that went to them.
+    /// Pixels whose error is less than a quarter of the allowed one, and the share of all rays spent on them.
     far_above: usize,
     wasted: f64,
 }
@@ -353,7 +353,7 @@ fn a_picture_is_as_exact_as_it_was_asked_to_be_and_hardly_more() {
         let said = found.sampled.targeted.unwrap();
         assert!((0.75..1.2).contains(&(error / asked)), "{target}: {error}, {said:?}");
         assert!((0.8..=1.03).contains(&(said.estimate.unwrap() / asked)), "{said:?}");
-        // Counted are all rays, those for finding out among them, and so is their time.
+        // All rays are counted, including those for planning, and so is their time.
         assert_eq!(found.counts.primary.queries, found.sampled.rays);
         let (profiled, profile) = s.with_job(AccelKind::DEFAULT, |job| render_profiled(job, &()));
         assert_eq!((profiled.picture, profile.rays[0]), (found.picture, found.sampled.rays));
@@ -365,7 +365,7 @@ fn a_picture_is_as_exact_as_it_was_asked_to_be_and_hardly_more() {
 fn whoever_waits_hears_of_the_work_before_a_picture_of_a_given_error_and_when_it_begins() {
     use std::sync::Mutex;
 
-    /// Runs of the same word.
+    /// Reported words, without repetitions.
     #[derive(Default)]
     struct Told(Mutex<Vec<&'static str>>);
     impl Told {
@@ -406,7 +406,7 @@ fn whoever_waits_hears_of_the_work_before_a_picture_of_a_given_error_and_when_it
 
 #[test]
 fn a_picture_of_hard_edges_alone_is_as_exact_as_it_says() {
-    // Turned squares: a pixel that an edge touches shows one colour or two, by which of its samples met it.
+    // Turned squares: a pixel that an edge crosses shows one colour or two, depending on which samples hit the square.
     let mut s = looking_down(1.0);
     (s.settings.width, s.settings.height) = (64, 48);
     s.scene.background = Some(Background::Color(Vec3::ZERO));
@@ -438,7 +438,7 @@ fn a_forecast_holds_what_then_happens() {
     let foretold = s.forecast();
     assert!(foretold.looked_at < foretold.pixels && foretold.pixels == 160 * 120);
     let rendered = s.render_by(AccelKind::DEFAULT);
-    // Pixels among their neighbours get some more rays than in the squares that were looked at.
+    // Pixels among their neighbours get some more rays than in the forecast's squares.
     let near = |i: Interval, value: f64| (0.8 * i.low..1.25 * i.high).contains(&value);
     assert!(near(foretold.rays, rendered.sampled.rays as f64), "{:?} {}", foretold.rays, rendered.sampled.rays);
     let c = rendered.counts;
@@ -462,7 +462,7 @@ fn where_nothing_is_to_be_seen_a_forecast_knows_the_rays_exactly_though_squares_
     assert_eq!(s.render().sampled.rays, u64::from(pixels));
 }
 
-/// By what its quadrants could change a pixel.
+/// Adaptive sampling by the possible effect of a quadrant on its pixel.
 fn effect(threshold: f32, min_levels: u32) -> Sampling {
     let space = ErrorSpace::Linear;
     Sampling::Adaptive(Adaptive { threshold, min_levels, space, ..Adaptive::usual(Split::Effect) })
@@ -470,7 +470,7 @@ fn effect(threshold: f32, min_levels: u32) -> Sampling {
 
 #[test]
 fn what_a_neighbour_found_on_the_border_of_a_quadrant_is_looked_into() {
-    // The slanted edge of a square as large as two pixels passes between corners and middles.
+    // The slanted edge of a square 26 pixels wide passes between corners and middles.
     let mut s = looking_down(1.0);
     (s.settings.width, s.settings.height) = (40, 34);
     s.view = View::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, Lens::orthographic(34.0));
@@ -493,7 +493,7 @@ fn what_a_neighbour_found_on_the_border_of_a_quadrant_is_looked_into() {
     s.settings.sampling = effect(0.002, 0);
     let (seen, fewer) = (off(&s), area(&s).1);
     assert!(5.0 * seen < corners && fewer < rays, "{seen} with {fewer} rays, {corners} with {rays}");
-    // The edges pass through the border of two tiles, too: all light that there is.
+    // The edges cross the border of two tiles, too: no light is lost.
     assert!((area(&s).0 / (26.0 * 26.0) - 1.0).abs() < 2e-4, "{}", area(&s).0);
 }
 

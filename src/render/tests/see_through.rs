@@ -1,4 +1,4 @@
-//! Alpha, straight transmission, and what lies behind.
+//! Alpha, straight transmission, and the surfaces behind.
 
 use super::*;
 use crate::accel::AccelChoice;
@@ -57,7 +57,7 @@ fn absent_texels_and_unseen_backs_are_passed_without_a_trace() {
     assert_eq!(s.alpha(), 1.0);
 }
 
-/// A sheet of which three eighths are there, in stripes, by the alpha or the map of its opacity.
+/// A sheet covered to three eighths, in stripes, by the alpha or by an opacity map.
 fn striped(alpha_mode: AlphaMode, by_map: bool, repeats: f32) -> Stage {
     let mut s = looking_down(9.0);
     let texels = (0..256 * 256).map(|i| if i % 8 < 3 { [255; 4] } else { [0, 0, 0, if by_map { 255 } else { 0 }] });
@@ -77,13 +77,13 @@ fn striped(alpha_mode: AlphaMode, by_map: bool, repeats: f32) -> Stage {
 fn of_what_is_cut_out_as_much_is_there_from_afar_as_from_near() {
     let mask = |cutoff: f32| AlphaMode::Mask { cutoff };
     for (alpha_mode, by_map) in [(mask(0.5), false), (mask(0.9), true), (mask(0.1), false), (AlphaMode::Blend, false)] {
-        // Pixels cover two stripes and more, up to hundreds, in no step with them.
+        // Pixels cover two stripes and more, up to hundreds, out of phase with them.
         for repeats in [0.27, 2.3, 37.7] {
             let beauty = striped(alpha_mode, by_map, repeats).render().picture.beauty;
             let alphas = beauty.iter().map(|pixel| pixel[3]);
             let least = alphas.clone().fold(1.0, f32::min);
             let mean = alphas.sum::<f32>() / 64.0;
-            // Between stripes alpha runs from one to the other: half a texel more or less, on both sides.
+            // Between stripes alpha is interpolated: the cutoff moves the edge by up to half a texel, on both sides.
             let more = match alpha_mode {
                 AlphaMode::Mask { cutoff } => (1.0 - 2.0 * cutoff) / 8.0,
                 _ => 0.0,
@@ -101,7 +101,7 @@ fn a_face_with_the_corners_of_one_that_is_not_there_is_seen() {
     for (over, color) in [(absent, Vec3::Z), (blended(Vec3::X, 0.5), Vec3::new(0.5, 0.0, 0.5)), (one_sided, Vec3::Z)] {
         let mut s = looking_down(9.0);
         s.square(0.0, 1.0, over).square(0.0, 1.0, unlit(Vec3::Z));
-        // Of the one-sided face the back is seen.
+        // The back of the one-sided face is seen.
         if !s.scene.materials[0].double_sided {
             s.scene.meshes[0].triangles.iter_mut().for_each(|t| t.swap(0, 1));
         }
@@ -109,8 +109,7 @@ fn a_face_with_the_corners_of_one_that_is_not_there_is_seen() {
     }
 }
 
-/// A square with a hole all over it, and in the same place, of the same mesh, one without: what a texel says decides, not whose
-/// corners it has.
+/// A square with a hole all over it, and in the same place, of the same mesh, one without: its texel decides, not its position.
 #[test]
 fn behind_a_hole_a_face_of_the_same_surface_in_the_same_place_is_seen() {
     let mut s = looking_down(9.0);
@@ -129,7 +128,7 @@ fn behind_a_hole_a_face_of_the_same_surface_in_the_same_place_is_seen() {
     let corners = mesh.positions.len() as u32;
     mesh.positions.extend_from_within(..);
     mesh.triangles.extend(mesh.triangles.clone().iter().map(|t| t.map(|corner| corner + corners)));
-    // Of the first face the texel that is not there, of the second the other.
+    // The first face reads the absent texel, the second the other.
     mesh.uvs = vec![(0..2 * corners).map(|i| Vec2::new(if i < corners { 0.25 } else { 0.75 }, 0.5)).collect()];
     let leaf = Material {
         alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
@@ -196,7 +195,7 @@ fn mirrored_instances_keep_their_front() {
 
 #[test]
 fn coverage_of_an_edge_is_counted_in_samples() {
-    // The square's edge runs through the middle of the second pixel's left samples.
+    // The square's edge runs through the middle of the third pixel, between its left and right samples.
     let mut s = looking_down(5.0);
     s.view = View::look_at(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, DVec3::Y, Lens::orthographic(1.0));
     s.settings = Settings { width: 4, height: 1, samples: 4, ..s.settings };
@@ -272,7 +271,7 @@ fn a_blended_surface_without_holes_has_the_bits_of_an_opaque_one() {
     }
 }
 
-/// Leaves before a wall and before what hides it from a lamp, some with holes; then what stands behind them, of so many faces.
+/// Leaves before a wall and before a square that hides the wall from a lamp, some with holes; then more faces behind them.
 fn leaves(holes: bool, behind: usize) -> Stage {
     let view = View::look_at(DVec3::new(3.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.9));
     let mut s = stage(view);
@@ -308,8 +307,7 @@ fn shadows_of_opaque_things_among_leaves_do_not_depend_on_how_many_of_either_the
     }
 }
 
-/// Sheets before a wall, between it and lamps, with a hole wherever a texel has none of the colour; some lie in one place,
-/// each with holes of its own.
+/// Sheets before a wall, between it and lamps, with a hole wherever a texel is clear; some coincide, each with holes of its own.
 fn sheets(alpha_mode: AlphaMode, magnify: Filter) -> Stage {
     let mut random = Random::new(31);
     let view = View::look_at(DVec3::new(3.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.9));
@@ -340,7 +338,7 @@ fn sheets(alpha_mode: AlphaMode, magnify: Filter) -> Stage {
         }
         s.mesh(mesh, place, leaf.clone());
     }
-    // Some stand in two places.
+    // Some have a second instance.
     for i in (1..24).step_by(4) {
         let (once, by) = (s.scene.instances[i].clone(), DAffine3::from_translation(DVec3::new(0.1, 0.0, 0.07)));
         let world_from_object = once.world_from_object * DAffine3::from_rotation_z(0.4) * by;
@@ -360,7 +358,7 @@ fn light_through_holes_is_what_is_left_when_every_surface_is_asked() {
                 assert!(world.instanced.is_empty() == (instances == Instancing::Flatten));
                 let rendered = render_in(&s, &world);
                 assert!(rendered.picture == asked.picture, "{alpha_mode:?}, {magnify:?}, {instances:?}");
-                // One question answers a ray.
+                // One query answers a ray.
                 let [one, many] = [&rendered, &asked].map(|r| r.counts.shadow.queries);
                 assert!(many > 2 * one, "{one} and {many}");
             }
@@ -388,7 +386,7 @@ fn light_through_more_than_is_noted_at_once_is_what_is_left_all_the_same() {
     assert!(one > 100_000 && one < many, "{one} and {many}: some walk, not all");
 }
 
-/// With every surface asked what it lets through.
+/// Renders with every surface tested for transparency.
 fn without_pruning(s: &Stage) -> Rendered {
     let world = World::new(&s.scene).without_pruning();
     let accel = AnyAccel::build(AccelKind::DEFAULT, &world.shapes, &AccelParams::DEFAULT);

@@ -1,10 +1,10 @@
-//! Lights with an extent, and their soft shadows.
+//! Area lights and their soft shadows.
 
 use super::*;
 use crate::accel::AccelKind;
 use std::f32::consts::PI;
 
-/// A white floor looked at straight down at one point, under a light of this kind and size.
+/// A white floor, viewed straight down at one point, under a light of this kind and size.
 fn floor(kind: LightKind, size: f64) -> Stage {
     let mut s = looking_down(0.5);
     s.view = View::look_at(DVec3::Z * 0.5, DVec3::ZERO, DVec3::Y, Lens::orthographic(0.001));
@@ -23,7 +23,7 @@ fn tilted(degrees: f64) -> DVec3 {
 #[test]
 fn a_ball_lights_as_a_point_of_its_candela_would() {
     for (height, radius) in [(1.0, 0.05), (1.0, 0.5), (2.0, 1.9)] {
-        // Straight above, a ball is Lambert's point light whatever its size: E = I / d².
+        // Straight above, a ball equals Lambert's point light whatever its size: E = I / d².
         let s = floor(LightKind::Point { position: DVec3::Z * height, falloff: SQUARE }, radius);
         let expected = 1.0 / (height * height) as f32;
         assert!((s.color().x / expected - 1.0).abs() < 0.01, "{height} {radius}: {}", s.color());
@@ -37,7 +37,7 @@ fn a_disc_in_the_sky_keeps_its_lux() {
     for degrees in [0.53f64, 20.0] {
         let s = floor(LightKind::Directional { direction: -tilted(40.0) }, 0.5 * degrees.to_radians());
         let expected = libm::cosf(40f32.to_radians());
-        // A wide disc is on average a little lower than its middle.
+        // A wide disc is on average slightly lower than its centre.
         assert!((s.color().x / expected - 1.0).abs() < 0.012, "{degrees}: {} for {expected}", s.color());
     }
 }
@@ -48,7 +48,7 @@ fn a_rectangle_lights_by_the_cosines_at_both_ends() {
     let toward = tilted(30.0);
     let u = DVec3::Y;
     let v = toward.cross(u);
-    // It faces the floor's middle: its normal is −toward.
+    // It faces the origin: its normal is −toward.
     let sides = [v * side, u * side];
     assert!(sides[0].cross(sides[1]).dot(toward) < 0.0 || sides[1].cross(sides[0]).dot(toward) < 0.0);
     let sides = if sides[0].cross(sides[1]).dot(toward) < 0.0 { sides } else { [sides[1], sides[0]] };
@@ -76,7 +76,7 @@ fn the_edge_of_a_shadow_is_as_soft_as_the_light_is_wide() {
     let tan = libm::tan(0.1);
     assert!(shadowed(-1.05 * tan, 0.1) > 0.98 && shadowed(1.05 * tan, 0.1) < 1e-6);
     let half = shadowed(-0.5 * tan, 0.1);
-    // The part of a disc on one side of a chord at half its radius: 1 − (π/3 − √3/4) / π.
+    // Part of a disc on one side of a chord at half its radius: 1 − (π/3 − √3/4) / π.
     assert!((half - 0.8045).abs() < 0.02, "{half}");
     assert_eq!((shadowed(-0.01, 0.0), shadowed(0.01, 0.0)), (1.0, 0.0), "without an extent it is sharp");
 }

@@ -1,4 +1,4 @@
-//! Pictures in tiles: what tiles tell each other, and trace for themselves.
+//! Pictures in tiles: the samples that tiles share, and those each traces for itself.
 
 use super::sampling::{soft, stochastic};
 use super::*;
@@ -9,7 +9,7 @@ use crate::render::layers::empty;
 use crate::render::tile::{Alone, Tile, render_some};
 use crate::render::{Sampling, Stochastic};
 
-/// A stage without rays that are spread by chance: nothing is traced beforehand.
+/// A stage without randomly spread rays: nothing is traced beforehand.
 fn sharp() -> Stage {
     let mut s = soft();
     (s.settings.lens, s.settings.gloss_rays) = (None, None);
@@ -23,7 +23,7 @@ fn tiles_that_share_first_samples_have_the_same_bits_whoever_traces_these() {
     }
 }
 
-/// Tests it where all tiles have their first samples to trace, and where these were traced before.
+/// Tests it where all tiles must trace their first samples, and where these were traced before.
 fn have_the_same_bits(mut s: Stage) {
     (s.settings.width, s.settings.height) = (130, 70);
     s.settings.sampling = Sampling::Stochastic(stochastic(0.08, 16));
@@ -49,14 +49,14 @@ fn pixels_around_tiles_are_looked_at_only_where_that_can_decide_something() {
         (sampled.rays - sampled.looked, sampled.counts.iter().map(|&n| u64::from(n)).sum::<u64>())
     };
     assert_eq!(rays(16), (40 * 12 * 16, 40 * 12 * 16));
-    // The two tiles meet in a line of twelve pixels: each looks at one row of the other's.
+    // The two tiles share a border of twelve pixels: each samples one row of the other's.
     let (all, kept) = rays(4);
     assert_eq!(all - kept, 2 * 12 * 4);
-    // Tiles tell each other what their first rays have met, so that only those that go on are traced twice.
+    // Tiles share the hits of their first rays, so that only pixels that go on are traced twice.
     let (all, kept) = rays(1);
-    // Were the first ones traced twice, too, it would be 48 more.
+    // If the first ones were traced twice, too, it would be 48 more.
     assert!((1..=2 * 12 * 3).contains(&(all - kept)), "{}", all - kept);
-    // What is known before is not traced for any tile.
+    // Samples known beforehand are not traced for any tile.
     let mut s = soft();
     (s.settings.width, s.settings.height) = (40, 12);
     s.settings.sampling = Sampling::Stochastic(stochastic(0.1, 16));
@@ -71,7 +71,7 @@ fn a_tile_by_itself_is_what_it_is_among_others() {
     }
 }
 
-/// Tests it where so many samples of each pixel are known before the picture.
+/// Tests it where the first `known` samples of each pixel are traced before the picture.
 fn is_the_same_by_itself(s: &mut Stage, known: u32) {
     (s.settings.width, s.settings.height, s.settings.layers) = (70, 40, true);
     for (min_samples, max_samples) in [(1, 64), (1, 2), (1, 1), (4, 16)] {
