@@ -58,8 +58,8 @@ impl Shown {
 /// Which single samples look like all of their eight neighbours; only for places that were compared.
 pub(in crate::render) struct Even {
     is_uneven: Vec<u32>,
-    /// Standard error of each pixel, the root of the mean over its channels, from the range of nine samples: an upper estimate,
-    /// as the neighbours lie farther apart than the pixel is wide.
+    /// Standard error of each pixel, the root of the mean over its channels, from the range of nine samples: its own and its
+    /// neighbours', which lie farther apart than the pixel is wide.
     errors: Vec<f32>,
 }
 

@@ -1,7 +1,7 @@
 //! Lights as seen from the points they illuminate: direction, strength, and the extent of a shadow ray.
 //!
-//! Area lights are sampled at points drawn by the solid angle they subtend (P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo
-//! Techniques for Direct Lighting Calculations", 1996).
+//! Balls and discs in the sky are sampled by the solid angle they subtend, rectangles by area (P. Shirley, C. Wang, K. Zimmerman,
+//! "Monte Carlo Techniques for Direct Lighting Calculations", 1996).
 //!
 //! Two units meet here. The founding texts give a light a factor I, the value that a white diffuse surface facing it shows; glTF
 //! gives candela and lux, of which such a surface shows the π-th part. Both become a *strength* in the first unit, so that a
@@ -17,7 +17,7 @@ use std::f32::consts::PI;
 pub(crate) struct LocalLight {
     intensity: Vec3,
     pub shadows: bool,
-    /// Radius, or half the angle of a disc in the sky, as in [`Light`]; then sine and cosine of that angle.
+    /// Radius, or half the angle of a disc in the sky, as in [`Light`]; and sine and cosine of it as an angle.
     size: f32,
     disc: (f32, f32),
     shape: Shape,

@@ -1,6 +1,6 @@
 //! Reflection and transmission of light: the material at a point, evaluated from factors, maps and vertex colours.
 //!
-//! Shading models answer two questions here: how much of a light's arriving light is seen ([`Bsdf::lit`], [`Bsdf::lit_through`]),
+//! Shading models answer two questions here: how much of a light is reflected to the view ([`Bsdf::lit`], [`Bsdf::lit_through`]),
 //! and with what weights the mirrored and refracted directions are seen ([`Bsdf::bounce_weights`]). The tracer decides which rays
 //! are sent, and follows them.
 

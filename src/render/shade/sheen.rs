@@ -87,7 +87,7 @@ fn alpha(roughness: f32) -> f32 {
     r * r
 }
 
-/// Distribution × visibility; `sine` is that between the half vector and the normal.
+/// Distribution × visibility; `sine` is that of the angle between half vector and normal.
 #[inline(always)]
 fn lobe(alpha: f32, sine: f32, n_l: f32, n_v: f32) -> f32 {
     let exponent = 1.0 / alpha;

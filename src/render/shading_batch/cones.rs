@@ -34,7 +34,7 @@ pub(crate) struct Cones {
 
 /// Mirror rays.
 struct Mirrored {
-    /// 1 where the mirror ray is sent.
+    /// 1 where the mirror ray weighs enough to be sent.
     alive: [u32; POINTS],
     weight: Columns,
     origin: Columns,

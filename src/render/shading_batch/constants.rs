@@ -14,7 +14,7 @@ pub(crate) struct MaterialConstants {
     pub bsdf: Bsdf,
     /// Whether rays pass backs of faces.
     pub one_sided: bool,
-    /// Opacity without maps and vertex colours.
+    /// Coverage without maps and vertex colours.
     pub coverage: f32,
     /// Whether it has maps.
     pub mapped: bool,

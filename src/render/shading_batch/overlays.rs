@@ -144,7 +144,7 @@ impl Overlays {
         [below_coat, below_coat * sheen]
     }
 
-    /// Attenuates the light of a lamp that points below them reflect, and adds their own.
+    /// Attenuates the direct light that points below them reflect, and adds their own.
     #[inline(always)]
     pub(super) fn reflect(&self, found: &Found, lit: &mut Lit, points: usize) {
         for i in 0..points.min(POINTS) {

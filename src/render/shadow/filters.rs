@@ -208,7 +208,7 @@ impl OccludedFilter for ShadowFilter<'_> {
     }
 }
 
-/// Transmitted fraction of light behind a surface, where it is cheap to tell.
+/// Transmitted fraction of light behind a surface, where it is cheap to compute.
 fn left_behind(context: &Context, target: &HitPrim, hit: &Hit) -> Option<f32> {
     if target.material.reflection.transmits() {
         return None;

@@ -10,7 +10,7 @@ use std::f32::consts::PI;
 /// Columns of the finest level that is sampled.
 pub(super) const COLUMNS: u32 = 1024;
 
-/// Average number of entries between two entries of a search guide.
+/// Average number of entries that one entry of the guide table covers.
 const GUIDED: usize = 4;
 
 /// Share of the draws that are uniform, so that dark parts are drawn too.

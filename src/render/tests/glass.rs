@@ -532,7 +532,7 @@ fn cube(half: f32) -> Mesh {
 
 #[test]
 fn walls_that_are_met_on_their_edges_and_corners_are_left_once() {
-    // The directions run along diagonals of the cubes and of their sides.
+    // Some directions hit the diagonals of sides, and some the corners of the cubes.
     let mut s = looking_down(0.0);
     s.view = View::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, Lens::orthographic(1.0));
     let around = |s: &Stage| {

@@ -83,7 +83,7 @@ fn of_what_is_cut_out_as_much_is_there_from_afar_as_from_near() {
             let alphas = beauty.iter().map(|pixel| pixel[3]);
             let least = alphas.clone().fold(1.0, f32::min);
             let mean = alphas.sum::<f32>() / 64.0;
-            // Between stripes alpha is interpolated: the cutoff moves the edge by up to half a texel, on both sides.
+            // Between stripes alpha is interpolated: the cutoff moves each edge by up to half a texel.
             let more = match alpha_mode {
                 AlphaMode::Mask { cutoff } => (1.0 - 2.0 * cutoff) / 8.0,
                 _ => 0.0,

@@ -43,7 +43,7 @@ const PROBES: usize = MAX_PROBES as usize;
 #[derive(Debug)]
 pub struct TextureStore<'a> {
     textures: &'a [Texture],
-    /// `None` for a bitmap that is empty, or smaller than its header says.
+    /// `None` for a bitmap that is empty, or has fewer texels than its width and height say.
     bitmaps: Vec<Option<Source<'a>>>,
     /// Read where there is no map.
     stand_in: Option<Source<'static>>,
