@@ -160,8 +160,9 @@ impl<'a> Context<'a> {
         let lights: Vec<LocalLight> = scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect();
         let light_rays = settings.light_rays.max(1).div_ceil(together);
         let alone = no_prune || settings.one_by_one;
-        let constants =
-            |m: (u32, &Material)| if alone { None } else { MaterialConstants::of(m, textures, depth > 0, gloss) };
+        let constants = |(id, m): (u32, &Material)| {
+            if alone { None } else { MaterialConstants::of(id, m, textures, depth > 0, gloss) }
+        };
         let needs = |any: &[Feature]| no_prune || any.iter().any(|&f| features.has(f));
         Self {
             scene,

@@ -137,7 +137,7 @@ impl EnvironmentRays {
         self.arrived.clear();
         self.arrived.resize(self.shares.len(), Vec3::ZERO);
         let arrived = &mut self.arrived;
-        self.shadows.trace((context, media), caster, probe, |tag, light| arrived[tag as usize] += light);
+        self.shadows.trace(context, media, caster, probe, |tag, light| arrived[tag as usize] += light);
         let half = context.env_rays.div_ceil(2) as usize;
         let halves = self.shares.chunks_exact(2 * half).zip(self.arrived.chunks_exact(2 * half));
         for (point, (sent, come)) in self.points.iter().zip(halves) {

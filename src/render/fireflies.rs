@@ -267,7 +267,7 @@ impl Question<'_> {
         let (columns, rows): (Vec<u32>, Vec<u32>) = tile.places().filter(is_asked).unzip();
         let mut places = Places::default();
         let each = (0..self.samples).map(|index| {
-            places.trace_each(self.frame, self.how, tracer, (index, &columns, &rows))?;
+            places.trace_each(self.frame, self.how, tracer, index, &columns, &rows)?;
             if let Some(ahead) = ahead {
                 let mut ahead = ahead.lock().unwrap_or_else(PoisonError::into_inner);
                 ahead.keep(index, (&columns, &rows), tracer);
@@ -292,7 +292,7 @@ impl Question<'_> {
             let pixel = bright[0].pixel;
             (self.samples..self.samples + AGAIN).map(move |index| Wanted { pixel, key: pixel_key(seed, pixel), index })
         });
-        Places::default().trace(self.frame, self.how, tracer, (Roulette::default(), wanted))?;
+        Places::default().trace(self.frame, self.how, tracer, Roulette::default(), wanted)?;
         let each = some.iter().zip(tracer.samples.chunks(AGAIN as usize));
         let rare = each.flat_map(|(bright, again)| {
             let (x, y) = bright[0].pixel;

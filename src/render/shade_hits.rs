@@ -174,7 +174,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             // Neighbours mostly hit the same.
             let first = eight[0].prim;
             let alike = eight.iter().all(|hit| hit.prim == first);
-            if !(alike && eight[0].is_some() && by_instance.take(context, (start, eight.len()), first)) {
+            if !(alike && eight[0].is_some() && by_instance.take(context, start, eight.len(), first)) {
                 (start..)
                     .zip(eight)
                     .for_each(|(i, hit)| self.shade_primary_ray(primary_rays, &mut by_instance, i, hit));
@@ -186,7 +186,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
 
     fn shade_primary_ray(&mut self, primary_rays: &PrimaryRays, by_instance: &mut HitsByInstance, i: u32, hit: &Hit) {
         if hit.is_some() {
-            if !by_instance.take(self.context, (i, 1), hit.prim) {
+            if !by_instance.take(self.context, i, 1, hit.prim) {
                 self.shade_one(TracedRays::PrimaryRays(primary_rays), i as usize);
             }
         } else if self.context.shows_environment {
@@ -225,7 +225,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
                 self.continuing[class as usize].push_behind(*ray, *path, *hit);
             } else if rays.len() < FEW
                 || self.sees_hotspot_again(path, hit)
-                || !by_instance.take(context, (index, 1), hit.prim)
+                || !by_instance.take(context, index, 1, hit.prim)
             {
                 self.shade_one(traced, i);
             }
@@ -269,7 +269,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             TracedRays::PrimaryRays(primary_rays) => {
                 let samples = &mut self.samples;
                 let tell = |i: u32, radiance: Vec3| samples[i as usize].radiance += radiance;
-                self.context.sky.each_behind(&missed, primary_rays.columns(), tell);
+                let (dirs, angles) = primary_rays.columns();
+                self.context.sky.each_behind(&missed, dirs, angles, tell);
             }
             TracedRays::Wave(_, wave) => {
                 let rays = missed.iter().map(|&i| (i, wave.rays[i as usize].dir, wave.paths[i as usize].cone_spread));
@@ -314,7 +315,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let (smooth, reads) = (!mesh.normals.is_empty(), constants.mapped || !mesh.colors.is_empty());
         let (bsdf, needs_cones, placement) =
             (&constants.bsdf, constants.needs_cones, context.world.placement(instance));
-        batch.take(hits, by_instance, (traced, &context.absorption, &self.media), smooth);
+        batch.take(hits, by_instance, traced, &context.absorption, &self.media, smooth);
         batch.find(smooth.then_some(placement));
         if reads || needs_cones || context.environment_needs_points() {
             batch.widen(traced);
@@ -334,7 +335,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         for index in batch.left_out() {
             self.shade_one(traced, index as usize);
         }
-        batch.thin_out((constants, reads), |at, passed| self.pass(traced, at, passed));
+        batch.thin_out(constants, reads, |at, passed| self.pass(traced, at, passed));
         if batch.is_empty() {
             return;
         }
@@ -354,7 +355,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         } else if needs_cones && context.depth > 0 {
             let (roulette, streams) = (self.roulette, &self.streams);
             let goes_on = |sample, path: &mut _| roulette.spin(streams, sample, path);
-            batch.mirror(context, bsdf, traced, (goes_on, &mut self.starting[RayClass::Reflected as usize]));
+            batch.mirror(context, bsdf, traced, goes_on, &mut self.starting[RayClass::Reflected as usize]);
         }
     }
 
@@ -393,22 +394,20 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
 
     /// Adds what the points show of their surroundings and of each light, or sends the rays that find whether it arrives.
     fn show(&mut self, traced: TracedRays, constants: &MaterialConstants, batch: &mut ShadingBatch) {
-        let (context, bsdf) = (self.context, &constants.bsdf);
-        let has_inside = constants.has_inside();
+        let context = self.context;
         if context.environment_needs_points() || constants.is_completed() {
             self.each_point(traced, constants, batch, |tracer, point| tracer.shade_environment(point));
-        } else if !context.is_dark || bsdf.shines() {
-            batch.shade_environment((bsdf, has_inside), &context.sky, context.scene.ambient);
+        } else if !context.is_dark || constants.bsdf.shines() {
+            batch.shade_environment(constants, &context.sky, context.scene.ambient);
             batch.shown().for_each(|(sample, everywhere)| self.add(sample, everywhere));
         }
         let absorbs = context.absorption.is_some();
         let within = absorbs && batch.certain().any(|i| traced.path(batch.arrival(i).0).media != Media::OUTSIDE);
-        let what = (bsdf, constants.needs_cones, has_inside);
         let mut draws = std::mem::take(&mut self.buffers.draws);
         draws.clear();
         for (number, light) in (0..).zip(&context.lights) {
             if !light.is_area() {
-                batch.shade_light(what, light, None);
+                batch.shade_light(constants, light, None);
                 self.choose(traced, (light, number), batch);
                 self.ask_for(traced, light, batch, (within, None));
                 continue;
@@ -417,7 +416,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
                 draws.extend(batch.certain().map(|i| self.draws_for_lights(traced, batch, i)));
             }
             for place in 0..batch.draw(draws.iter_mut().map(|(i, draws, rays)| (*i, draws.spread(*rays), *rays))) {
-                batch.shade_light(what, light, Some(place));
+                batch.shade_light(constants, light, Some(place));
                 self.choose(traced, (light, mix(number, place + 1)), batch);
                 self.ask_for(traced, light, batch, (within, Some(place)));
             }

@@ -154,8 +154,8 @@ pub(crate) fn render_tiles<A: Accel, P: Observer>(
             let TracedTiles { counts, complete, .. } = each_tile(context, accel, &tiles, progress, work);
             (counts, complete)
         }
-        Sampling::Adaptive(how) => adaptive::render_all(&frame, how, (context, accel), progress, &tiles, &keep),
-        Sampling::Stochastic(how) => stochastic::render_all(&frame, how, (context, accel), progress, &tiles, &keep),
+        Sampling::Adaptive(how) => adaptive::render_all(&frame, how, context, accel, progress, &tiles, &keep),
+        Sampling::Stochastic(how) => stochastic::render_all(&frame, how, context, accel, progress, &tiles, &keep),
     };
     let Whole { mut picture, sampled } = whole.into_inner().unwrap_or_else(PoisonError::into_inner);
     if let Some(layers) = &mut picture.layers {

@@ -219,15 +219,10 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let samples = &mut self.samples;
         let mut arrive = |sample: u32, light: Vec3| samples[sample as usize].radiance += light;
         if self.shadows.len() > 0 {
-            self.shadows.trace((self.context, &mut self.media), &mut self.caster, &mut self.counts.shadow, &mut arrive);
+            self.shadows.trace(self.context, &mut self.media, &mut self.caster, &mut self.counts.shadow, &mut arrive);
         }
         if self.hotspots.len() > 0 {
-            self.hotspots.trace(
-                (self.context, &mut self.media),
-                &mut self.caster,
-                &mut self.counts.shadow,
-                &mut arrive,
-            );
+            self.hotspots.trace(self.context, &mut self.media, &mut self.caster, &mut self.counts.shadow, &mut arrive);
         }
         self.environment_rays.trace((self.context, &mut self.media), &mut self.caster, &mut self.counts.shadow, arrive);
     }

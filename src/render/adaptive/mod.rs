@@ -64,7 +64,8 @@ pub(super) fn render<A: Accel, P: Observer>(
 pub(super) fn render_all<A: Accel, P: Observer>(
     frame: &Frame,
     how: &Adaptive,
-    (context, accel): (&Context, &A),
+    context: &Context,
+    accel: &A,
     progress: &dyn Progress,
     tiles: &[Tile],
     keep: &(impl Fn(TilePixels) + Sync),

@@ -202,7 +202,7 @@ impl<'a> AlphaVoids<'a> {
         let mesh = self.scene.instances[instance as usize].mesh as usize;
         let (masked_mesh, map) = (self.masked_meshes[mesh].as_ref()?, maps.of_meshes[mesh]?);
         Option::as_ref(&maps.surveys[map as usize])?;
-        masked_mesh.face(self.world, (instance, triangle, prim), map)
+        masked_mesh.face(self.world, instance, triangle, prim, map)
     }
 
     fn all_faces(&self, maps: &Maps) -> Vec<Face> {
@@ -227,7 +227,7 @@ impl<'a> AlphaVoids<'a> {
 
 impl MaskedMesh<'_> {
     /// Face of a triangle of an instance, with its prim, on the map with this index.
-    fn face(&self, world: &World, (instance, triangle, prim): (u32, u32, u32), map: u32) -> Option<Face> {
+    fn face(&self, world: &World, instance: u32, triangle: u32, prim: u32, map: u32) -> Option<Face> {
         let Self { cut, mesh, uvs, turn, texels } = *self;
         let corner = |i: u32| uvs.get(i as usize).map_or(Vec2::NAN, |&uv| turn.apply(uv) * texels);
         let uv = mesh.triangles[triangle as usize].map(corner);

@@ -116,7 +116,7 @@ impl Kernel for Compare<'_, '_> {
         // Where alpha is not written, it is not compared.
         for column in &shown.colors[..channels] {
             let rows = [places.start - columns, places.start, places.start + columns];
-            differ(rows.map(|at| &column[at - 1..=at + places.len()]), limit, (&mut *uneven, &mut *errors));
+            differ(rows.map(|at| &column[at - 1..=at + places.len()]), limit, &mut *uneven, &mut *errors);
         }
         for error in errors {
             *error = (*error / channels as f32).sqrt() / RANGE;
@@ -127,7 +127,7 @@ impl Kernel for Compare<'_, '_> {
 /// Marks consecutive places where one of the nine values at and around them is farther than the limit from the middle one, and
 /// adds the square of their range to `errors`; `rows` begin one place before and end one behind.
 #[inline(always)]
-fn differ([above, own, below]: [&[f32]; 3], limit: f32, (uneven, errors): (&mut [u32], &mut [f32])) {
+fn differ([above, own, below]: [&[f32]; 3], limit: f32, uneven: &mut [u32], errors: &mut [f32]) {
     let count = own.len().saturating_sub(2).min(uneven.len()).min(errors.len());
     // Equal, known lengths, so that the loop has no bounds checks.
     let [above, own, below] = [above, own, below].map(|row| &row[..count + 2]);
@@ -183,7 +183,7 @@ mod tests {
                 [0.02, 0.08].iter().flat_map(|&error| Level::all().into_iter().map(move |l| (error, l)))
             {
                 let judge =
-                    Certainty { level, ..Certainty::new(None, (background, false), transparent, error, factor(0.95)) };
+                    Certainty { level, ..Certainty::new(None, background, false, transparent, error, factor(0.95)) };
                 let (shown, pixels) = judge.see_samples(&samples);
                 let groups: Vec<[Sum; 1]> = samples.iter().map(|sample| [Sum::of(sample)]).collect();
                 let resolved: Vec<_> = samples.iter().map(|sample| Sum::of(sample).resolve(background).0).collect();

@@ -62,7 +62,8 @@ impl<'a> Certainty<'a> {
     /// `factor` standard errors ([`factor`]).
     pub(super) fn new(
         output: Option<&'a Output>,
-        (background, has_veil): (Option<Vec3>, bool),
+        background: Option<Vec3>,
+        has_veil: bool,
         transparent: bool,
         error: f32,
         factor: f32,
@@ -80,7 +81,7 @@ impl<'a> Certainty<'a> {
         background: Option<Background>,
     ) -> Self {
         let transparent = matches!(background, None | Some(Background::Transparent));
-        Self::new(output, (frame.background, frame.has_veil), transparent, how.error, frame.standard_errors)
+        Self::new(output, frame.background, frame.has_veil, transparent, how.error, frame.standard_errors)
     }
 
     /// Whether samples in this range agree within the allowed error: the pixel shows no detail that could be missed.
@@ -248,7 +249,7 @@ mod tests {
 
     #[test]
     fn pixels_of_few_samples_must_look_more_alike_than_those_of_many() {
-        let judge = Certainty::new(None, (None, false), false, 0.1, 1.0);
+        let judge = Certainty::new(None, None, false, false, 0.1, 1.0);
         let differ = |step: f32, samples| judge.differ(Vec4::ZERO, Vec4::splat(step), samples);
         // The limits of one sample, of two and three, and of more, which allow for shading from pixel to pixel.
         for (samples, most) in [(1, 0.025), (2, 0.1), (3, 0.1), (4, 0.2), (256, 0.2)] {
@@ -259,7 +260,7 @@ mod tests {
     #[test]
     fn what_is_the_same_in_all_groups_is_certain() {
         let output = output(ErrorSpace::default(), None);
-        let judge = Certainty::new(output.as_ref(), (None, false), false, 0.01, factor(0.95));
+        let judge = Certainty::new(output.as_ref(), None, false, false, 0.01, factor(0.95));
         assert_eq!(standard_error(&judge, &[grey(0.3, 3.0); GROUPS]), 0.0);
         let agree = |samples: &[Sum]| judge.agree(&see(&judge, samples).range);
         assert!(agree(&[grey(0.3, 1.0); 4]) && !agree(&[grey(0.3, 1.0), grey(0.4, 1.0)]));
@@ -267,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_wire_is_thin_and_an_edge_is_not() {
-        let judge = Certainty::new(None, (None, false), false, 0.01, factor(0.95));
+        let judge = Certainty::new(None, None, false, false, 0.01, factor(0.95));
         let seen = |colors: [f32; 9]| colors.map(|light| see(&judge, &[grey(light, 1.0)]));
         let own = see(&judge, &[grey(0.0, 1.0), grey(1.0, 1.0)]);
         let is_thin = |colors: [f32; 9]| judge.is_thin(&own.range, seen(colors).into_iter());
@@ -283,7 +284,7 @@ mod tests {
     #[test]
     fn rays_that_nobody_needed_are_those_beyond_the_error_that_was_allowed() {
         // Powers of two, whose products are exact.
-        let judge = Certainty::new(None, (None, false), false, 1.0 / 64.0, 2.0);
+        let judge = Certainty::new(None, None, false, false, 1.0 / 64.0, 2.0);
         assert_eq!(judge.used(1.0 / 128.0, 0.0, 64), 1.0);
         assert_eq!(judge.spare(1.0, 64), 0);
         // Half the error: half of the samples beyond the first [`GROUPS`].
@@ -296,7 +297,7 @@ mod tests {
     #[test]
     fn what_is_brighter_than_white_counts_as_much_more_until_it_has_been_seen() {
         let output = output(ErrorSpace::default(), None);
-        let judge = Certainty::new(output.as_ref(), (None, false), false, 0.01, factor(0.95));
+        let judge = Certainty::new(output.as_ref(), None, false, false, 0.01, factor(0.95));
         let mut groups = [grey(0.25, 4.0); GROUPS];
         assert_eq!(see(&judge, &[grey(64.0, 2.0), grey(0.5, 2.0)]).range.brightest, 64.0);
         assert_eq!(judge.beyond_white(&groups, 64.0), 64.0);
@@ -304,13 +305,13 @@ mod tests {
         // One of four samples has hit it.
         groups[3] = grey(16.0, 4.0);
         assert_eq!(judge.beyond_white(&groups, 64.0), 1.0);
-        let linear = Certainty::new(None, (None, false), false, 0.01, factor(0.95));
+        let linear = Certainty::new(None, None, false, false, 0.01, factor(0.95));
         assert_eq!(linear.beyond_white(&[grey(0.25, 4.0); GROUPS], 64.0), 1.0, "contrast says so itself");
     }
 
     #[test]
     fn linear_errors_are_those_of_a_mean() {
-        let judge = Certainty::new(None, (None, false), false, 0.01, factor(0.95));
+        let judge = Certainty::new(None, None, false, false, 0.01, factor(0.95));
         let values = [0.1_f32, 0.3, 0.2, 0.5, 0.4, 0.2, 0.1, 0.2];
         let mean = values.iter().sum::<f32>() / 8.0;
         let expected = (values.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / (8.0 * 7.0)).sqrt();
@@ -321,7 +322,7 @@ mod tests {
     /// Pixels of normal samples, in rounds that double, judged as in pictures.
     #[test]
     fn pixels_that_stop_at_the_first_content_look_are_right_as_often_as_asked() {
-        let judge = Certainty::new(None, (None, false), false, 0.05, factor(0.95));
+        let judge = Certainty::new(None, None, false, false, 0.05, factor(0.95));
         let mut random = Random::new(11);
         for spread in [0.1_f32, 0.3, 0.7, 1.5] {
             let (pixels, mut right) = (4000, 0);
@@ -350,7 +351,7 @@ mod tests {
 
     /// Means, over many pixels of constant brightness, of the squared errors and of the squared standard errors.
     fn squares(samples: u32, brightness: impl Fn([f64; 2], u32) -> f64, mean: f64) -> (f64, f64) {
-        let judge = Certainty::new(None, (None, false), false, 0.01, factor(0.95));
+        let judge = Certainty::new(None, None, false, false, 0.01, factor(0.95));
         let pixels = 2000;
         let (mut errors, mut estimates) = (0.0, 0.0);
         for pixel in 0..pixels {

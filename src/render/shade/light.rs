@@ -171,7 +171,8 @@ impl LocalLight {
     pub(crate) fn arriving_at(
         &self,
         points: usize,
-        (position, at): (impl Fn(usize) -> Vec3, impl Fn(usize) -> Option<[f32; 2]>),
+        position: impl Fn(usize) -> Vec3,
+        at: impl Fn(usize) -> Option<[f32; 2]>,
         mut take: impl FnMut(usize, (Incident, bool)),
     ) {
         // The shape is matched outside the loop, which is then branch-free.

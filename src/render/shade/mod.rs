@@ -393,14 +393,14 @@ impl Bsdf {
             Model::Phong(m) => m.lit(normal, view, light.to_light) * light.strength(),
             Model::MetalRough(m) => self.lit_below(m, normal, view, light.to_light) * light.irradiance(),
         };
-        self.lit_over(below, (horizon, normal, view), light.to_light, light.irradiance())
+        self.lit_over(below, horizon, normal, view, light.to_light, light.irradiance())
     }
 
     /// Like [`Self::lit`], of a metallic-rough surface, for irradiance `light` from `to_light`.
     pub(crate) fn lit_with_lobes(&self, horizon: Vec3, normal: Vec3, view: Vec3, to_light: Vec3, light: Vec3) -> Vec3 {
         let Model::MetalRough(m) = &self.model else { return Vec3::ZERO };
         let below = self.lit_below(m, normal, view, to_light) * light;
-        self.lit_over(below, (horizon, normal, view), to_light, light)
+        self.lit_over(below, horizon, normal, view, to_light, light)
     }
 
     /// BRDF × N·L of the metallic-rough surface below sheen and clear coat.
@@ -413,13 +413,7 @@ impl Bsdf {
     }
 
     /// Adds sheen and clear coat under the same irradiance over the light `below`.
-    fn lit_over(
-        &self,
-        below: Vec3,
-        (horizon, normal, view): (Vec3, Vec3, Vec3),
-        to_light: Vec3,
-        irradiance: Vec3,
-    ) -> Vec3 {
+    fn lit_over(&self, below: Vec3, horizon: Vec3, normal: Vec3, view: Vec3, to_light: Vec3, irradiance: Vec3) -> Vec3 {
         let mut all = below * self.clear();
         if let Some(sheen) = &self.sheen {
             all += sheen.lit(normal, view, to_light) * irradiance * self.below_coat();

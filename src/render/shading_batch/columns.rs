@@ -151,7 +151,9 @@ impl ShadingBatch {
         &mut self,
         hit: &[(u32, u32)],
         sorted: &HitsByInstance,
-        (traced, absorption, media): (TracedRays, &Absorption, &MediaTable),
+        traced: TracedRays,
+        absorption: &Absorption,
+        media: &MediaTable,
         smooth: bool,
     ) {
         self.count = hit.len().min(POINTS);
@@ -398,6 +400,7 @@ impl Found {
 
 #[cfg(test)]
 mod tests {
+    use super::super::constants::MaterialConstants;
     use super::super::hits_by_instance::Face;
     use super::*;
     use crate::accel::{Hit, NO_PRIM, Ray};
@@ -428,8 +431,9 @@ mod tests {
         }
         let hit: Vec<(u32, u32)> = (0..61).map(|i| (i, i)).collect();
         let wave = wave(rays, hits);
-        let traced = (TracedRays::Wave(RayClass::Reflected, &wave), &Absorption::default(), &MediaTable::default());
-        batch.take(&hit, &HitsByInstance::of_faces(faces), traced, true);
+        let traced = TracedRays::Wave(RayClass::Reflected, &wave);
+        let by_instance = HitsByInstance::of_faces(faces);
+        batch.take(&hit, &by_instance, traced, &Absorption::default(), &MediaTable::default(), true);
         batch
     }
 
@@ -443,12 +447,23 @@ mod tests {
         batch.find(placement);
         let kind = LightKind::Point { position: DVec3::new(1.0, 3.0, 2.0), falloff: Falloff::None };
         let light = Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size };
-        let bsdf = Bsdf::without_maps(&Material::plain(), &TextureStore::new(&Scene::default()));
+        let constants = MaterialConstants {
+            material: 0,
+            bsdf: Bsdf::without_maps(&Material::plain(), &TextureStore::new(&Scene::default())),
+            one_sided: true,
+            coverage: 1.0,
+            mapped: false,
+            material_maps: None,
+            needs_cones: false,
+            glass: None,
+            lobes: None,
+            spreads: false,
+        };
         batch.draw((0..61).map(|i| (i, SampleSet::Part { key: mix(7, i as u32), first: 3 * i as u32 }, 3)));
         let place = (size > 0.0).then_some(1);
         let studio = Scene { environment: Environment::Studio, ..Scene::default() };
-        batch.shade_environment((&bsdf, false), &Sky::new(&studio), Vec3::ONE);
-        batch.shade_light((&bsdf, false, false), &LocalLight::new(&light, DVec3::ZERO), place);
+        batch.shade_environment(&constants, &Sky::new(&studio), Vec3::ONE);
+        batch.shade_light(&constants, &LocalLight::new(&light, DVec3::ZERO), place);
         let point = |i: usize| {
             let (f, l) = (&batch.found, &batch.lit);
             let around = &batch.surroundings.radiance;
@@ -489,9 +504,8 @@ mod tests {
         for level in Level::all() {
             for count in [1, 7, 8, 40, POINTS] {
                 let mut batch = ShadingBatch { level, ..ShadingBatch::default() };
-                let traced =
-                    (TracedRays::Wave(RayClass::Reflected, &wave), &Absorption::default(), &MediaTable::default());
-                batch.take(&hit[..count], &sorted, traced, true);
+                let traced = TracedRays::Wave(RayClass::Reflected, &wave);
+                batch.take(&hit[..count], &sorted, traced, &Absorption::default(), &MediaTable::default(), true);
                 let given = &batch.given;
                 for (i, &(index, face)) in hit[..count].iter().enumerate() {
                     let (ray, of_hit) = (&wave.rays[index as usize], &wave.hits[index as usize]);

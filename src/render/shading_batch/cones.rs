@@ -104,7 +104,8 @@ impl ShadingBatch {
         context: &Context,
         bsdf: &Bsdf,
         traced: TracedRays,
-        (goes_on, to): (impl Fn(u32, &mut Path) -> bool, &mut Queue),
+        goes_on: impl Fn(u32, &mut Path) -> bool,
+        to: &mut Queue,
     ) {
         let Self { cones, painted, found, given, weights, .. } = self;
         let (points, cutoff) = (padded(self.count), context.least_cutoff());
@@ -227,24 +228,24 @@ impl Kernel for Mirror<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
         let Self { painted, found, cones, points, bsdf, weights, cutoff } = self;
-        let (any, rays) = (painted.any, (weights, cutoff));
+        let any = painted.any;
         match &bsdf.model {
             Model::Unlit(_) => cones.mirrored.alive.fill(0),
             Model::Phong(m) if any => {
                 let m = *m;
-                mirror(found, cones, points, rays, |i, cosine| painted.phong(i, &m).reflected(cosine));
+                mirror(found, cones, points, weights, cutoff, |i, cosine| painted.phong(i, &m).reflected(cosine));
             }
             Model::Phong(m) => {
                 let m = *m;
-                mirror(found, cones, points, rays, |_, cosine| m.reflected(cosine));
+                mirror(found, cones, points, weights, cutoff, |_, cosine| m.reflected(cosine));
             }
             Model::MetalRough(m) if any => {
                 let m = *m;
-                mirror(found, cones, points, rays, |i, cosine| painted.metal_rough(i, &m).reflected(cosine));
+                mirror(found, cones, points, weights, cutoff, |i, cosine| painted.metal_rough(i, &m).reflected(cosine));
             }
             Model::MetalRough(m) => {
                 let m = *m;
-                mirror(found, cones, points, rays, |_, cosine| m.reflected(cosine));
+                mirror(found, cones, points, weights, cutoff, |_, cosine| m.reflected(cosine));
             }
         }
     }
@@ -257,7 +258,8 @@ fn mirror(
     found: &Found,
     cones: &mut Cones,
     points: usize,
-    (weights, cutoff): (&Columns, f32),
+    weights: &Columns,
+    cutoff: f32,
     share: impl Fn(usize, f32) -> Vec3,
 ) {
     let Cones { mirrored: to, bend, spread, .. } = cones;

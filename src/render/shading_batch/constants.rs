@@ -56,7 +56,8 @@ pub(crate) struct Glass {
 impl MaterialConstants {
     /// `None` for a transmitting material, unless it is metallic-rough and rays pass through it without being scattered inside.
     pub(crate) fn of(
-        (number, material): (u32, &Material),
+        number: u32,
+        material: &Material,
         store: &TextureStore,
         bounces: bool,
         gloss: Gloss,

@@ -1,6 +1,7 @@
 //! Environment light that the points of a batch reflect, and the light they emit.
 
 use super::columns::{Column, Columns, Found, POINTS, ShadingBatch, get, padded, put};
+use super::constants::MaterialConstants;
 use super::overlays::Overlays;
 use super::painted::Painted;
 use crate::math::Vec3;
@@ -52,9 +53,9 @@ impl Default for Surroundings {
 }
 
 impl ShadingBatch {
-    /// Computes the light of `sky` and ambient light reflected by each point of a surface of `bsdf`; if it `has_inside`, backs
-    /// are seen from inside.
-    pub(crate) fn shade_environment(&mut self, (bsdf, has_inside): (&Bsdf, bool), sky: &Sky, ambient: Vec3) {
+    /// Computes the light of `sky` and ambient light reflected by each point of a material.
+    pub(crate) fn shade_environment(&mut self, constants: &MaterialConstants, sky: &Sky, ambient: Vec3) {
+        let (bsdf, has_inside) = (&constants.bsdf, constants.has_inside());
         let (found, painted, to, points) = (&self.found, &self.painted, &mut self.surroundings, padded(self.count));
         let overlays = self.overlays.as_deref_mut().filter(|over| over.any());
         self.level.run(Look { found, painted, overlays, to, points, bsdf, has_inside, sky, ambient });

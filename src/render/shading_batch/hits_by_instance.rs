@@ -59,7 +59,7 @@ impl HitsByInstance {
 
     /// Adds the hits of `count` consecutive rays on one prim; false if they must be shaded one by one.
     #[inline(always)]
-    pub(crate) fn take(&mut self, context: &Context, (first, count): (u32, usize), prim: u32) -> bool {
+    pub(crate) fn take(&mut self, context: &Context, first: u32, count: usize, prim: u32) -> bool {
         let place = &mut self.remembered[prim as usize % REMEMBERED];
         if place.0 != prim {
             *place = (prim, u32::try_from(self.faces.len()).unwrap_or(NONE));

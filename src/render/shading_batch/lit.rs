@@ -3,6 +3,7 @@
 use super::area_lights::Drawn;
 use super::columns::{Column, Columns, Found, LANES, POINTS, ShadingBatch, get, leave, padded, put};
 use super::cones::Cones;
+use super::constants::MaterialConstants;
 use super::environment::Weigh;
 use super::formulas::{
     Diffuse, Formula, Mapped, MetalRough, Phong, PointBsdf, SidedMetalRough, Uniform, WidenedMetalRough,
@@ -55,19 +56,14 @@ impl Default for Lit {
 }
 
 impl ShadingBatch {
-    /// Computes the contribution of `light` at each point of a surface of `bsdf`, whose highlights may be narrow if it
-    /// `needs_cones`; if it `has_inside`, which implies cones, backs are seen from inside. For an area light, `place` is the
-    /// index of each point's sample.
-    pub(crate) fn shade_light(
-        &mut self,
-        (bsdf, needs_cones, has_inside): (&Bsdf, bool, bool),
-        light: &LocalLight,
-        place: Option<u32>,
-    ) {
+    /// Computes the contribution of `light` at each point of a material. For an area light, `place` is the index of each
+    /// point's sample.
+    pub(crate) fn shade_light(&mut self, constants: &MaterialConstants, light: &LocalLight, place: Option<u32>) {
+        let (bsdf, has_inside) = (&constants.bsdf, constants.has_inside());
         let (found, lit, points) = (&self.found, &mut self.lit, padded(self.count));
         let (painted, point_bsdfs) = (&self.painted, &self.point_bsdfs);
         let overlays = self.overlays.as_deref().filter(|over| over.any());
-        let cones = needs_cones.then_some(&self.cones);
+        let cones = constants.needs_cones.then_some(&self.cones);
         let drawn = place.map(|place| (&mut self.drawn, place));
         let direct =
             DirectLight { found, lit, points, bsdf, painted, point_bsdfs, overlays, cones, has_inside, light, drawn };
@@ -127,19 +123,20 @@ impl ShadingBatch {
 
     /// Sends the shadow rays that start on their triangles, outside of all media where that matters.
     pub(crate) fn send(&self, shadows: &mut ShadowQueue, absorbs: bool) {
-        let count = self.write(shadows.room());
+        let count = self.write(shadows);
         shadows.take(count, std::iter::repeat_n(Media::OUTSIDE, if absorbs { count } else { 0 }));
     }
 
     /// Sends the shadow rays, each starting in the media that the ray of its point is in.
     pub(crate) fn send_within(&self, shadows: &mut ShadowQueue, traced: TracedRays) {
-        let count = self.write(shadows.room());
+        let count = self.write(shadows);
         let rays = self.rays.iter().zip(&self.lit.seen).filter(|(_, seen)| **seen == PLAIN);
         shadows.take(count, rays.map(|(&ray, _)| traced.path(ray as usize).media).take(count));
     }
 
     /// Writes the shadow rays that start on their triangles; returns their number.
-    fn write(&self, (rays, light): (&mut [Ray; POINTS], &mut [Bound; POINTS])) -> usize {
+    fn write(&self, shadows: &mut ShadowQueue) -> usize {
+        let (rays, light) = shadows.room();
         let (prims, samples, lit) = (self.given.faces.prims(), &self.samples, &self.lit);
         self.level.run(Send { points: self.count.min(POINTS), prims, samples, lit, rays, light })
     }
@@ -247,12 +244,22 @@ impl DirectLight<'_> {
         match &mut drawn {
             Some((drawn, place)) if AREA => {
                 let [x, y] = drawn.places(*place, points);
-                light.arriving_at(points, (position, |i| Some([x[i], y[i]])), |i, (incident, arrives)| {
-                    arrive(lit, i, (incident, arrives & drawn.has(i, *place)), in_lux);
-                    put(&mut drawn.ends, i, incident.position.unwrap_or(Vec3::ZERO));
-                });
+                light.arriving_at(
+                    points,
+                    position,
+                    |i| Some([x[i], y[i]]),
+                    |i, (incident, arrives)| {
+                        arrive(lit, i, incident, arrives & drawn.has(i, *place), in_lux);
+                        put(&mut drawn.ends, i, incident.position.unwrap_or(Vec3::ZERO));
+                    },
+                );
             }
-            _ => light.arriving_at(points, (position, |_| None), |i, it| arrive(lit, i, it, in_lux)),
+            _ => light.arriving_at(
+                points,
+                position,
+                |_| None,
+                |i, (incident, arrives)| arrive(lit, i, incident, arrives, in_lux),
+            ),
         }
         // The model is matched outside the loop, which is then branch-free.
         match bsdf.model {
@@ -262,11 +269,11 @@ impl DirectLight<'_> {
             Model::Phong(m) if m.glows() => reflect_phong(found, lit, points, &Uniform(m)),
             Model::Phong(m) => reflect(found, lit, points, &Diffuse(m)),
             Model::MetalRough(m) => {
-                let surroundings = (overlays, cones, has_inside);
                 if painted.any {
-                    reflect_metal_rough(found, lit, points, Mapped { painted, unmapped: m }, surroundings);
+                    let mapped = Mapped { painted, unmapped: m };
+                    reflect_metal_rough(found, lit, points, mapped, overlays, cones, has_inside);
                 } else {
-                    reflect_metal_rough(found, lit, points, Uniform(m), surroundings);
+                    reflect_metal_rough(found, lit, points, Uniform(m), overlays, cones, has_inside);
                 }
             }
         }
@@ -283,7 +290,7 @@ impl DirectLight<'_> {
 
 /// Stores the light that arrives at a point.
 #[inline(always)]
-fn arrive(lit: &mut Lit, i: usize, (incident, arrives): (Incident, bool), in_lux: bool) {
+fn arrive(lit: &mut Lit, i: usize, incident: Incident, arrives: bool, in_lux: bool) {
     put(&mut lit.to_light, i, incident.to_light);
     put(&mut lit.light, i, if in_lux { incident.irradiance() } else { incident.strength() });
     lit.seen[i] = u32::from(arrives);
@@ -303,7 +310,9 @@ fn reflect_metal_rough(
     lit: &mut Lit,
     points: usize,
     bsdfs: impl PointBsdf<Bsdf = MetalRoughBsdf>,
-    (overlays, cones, has_inside): (Option<&Overlays>, Option<&Cones>, bool),
+    overlays: Option<&Overlays>,
+    cones: Option<&Cones>,
+    has_inside: bool,
 ) {
     let Some(Cones { least_square, .. }) = cones else { return reflect(found, lit, points, &MetalRough(bsdfs)) };
     let widened = WidenedMetalRough { bsdfs, least_square };
@@ -338,7 +347,7 @@ fn highlights(found: &Found, lit: &Lit, points: usize, bsdfs: &impl PointBsdf<Bs
 
 /// Stores the contribution of a light at a point, if it `counts`; `above` tells whether it lies above the horizon.
 #[inline(always)]
-fn keep(found: &Found, lit: &mut Lit, i: usize, (radiance, counts): (Vec3, bool), above: bool) {
+fn keep(found: &Found, lit: &mut Lit, i: usize, radiance: Vec3, counts: bool, above: bool) {
     let grazes = above & (found.curved[i] == 1) & (get(&found.geometric, i).dot(get(&lit.to_light, i)) < STEEP);
     let seen = counts & radiance.is_finite() & (radiance.max_element() > 0.0) & (found.certain[i] == 1);
     let how = if grazes { GRAZING } else { PLAIN };
@@ -362,7 +371,7 @@ fn keep_all(found: &Found, lit: &mut Lit, points: usize) {
     for i in 0..points.min(POINTS) {
         let above = get(&found.horizon, i).dot(get(&lit.to_light, i)) > 0.0;
         let radiance = get(&lit.radiance, i);
-        keep(found, lit, i, (radiance, above), above);
+        keep(found, lit, i, radiance, above, above);
     }
 }
 
@@ -378,7 +387,7 @@ fn reflect_with_lobes(found: &Found, lit: &mut Lit, point_bsdfs: &[Bsdf]) {
             (true, false) => bsdf.lit_through_lobes(normal, view, to_light, light),
             (false, _) => Vec3::ZERO,
         };
-        keep(found, lit, i, (radiance, counts), above);
+        keep(found, lit, i, radiance, counts, above);
     }
     lit.seen[point_bsdfs.len().min(POINTS)..].fill(0);
 }
@@ -392,7 +401,7 @@ fn reflect(found: &Found, lit: &mut Lit, points: usize, formula: &impl Formula) 
         let smooth = terminator(horizon, normal, to_light);
         let reflected = formula.reflected(i, normal, get(&found.view, i), to_light);
         let radiance = reflected * get(&lit.light, i) * smooth;
-        keep(found, lit, i, (radiance, above), above);
+        keep(found, lit, i, radiance, above, above);
     }
 }
 

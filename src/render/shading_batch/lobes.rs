@@ -31,7 +31,7 @@ impl ShadingBatch {
         let metal_rough = context.scene.materials[placed.mesh.material as usize].metal_rough();
         let (Some(m), Some(lobes)) = (metal_rough, constants.lobes.filter(|lobes| !lobes.are_overlays)) else { return };
         let mut point_bsdfs = std::mem::take(&mut self.point_bsdfs);
-        self.each_lobe_frame(context, traced, placed, (constants, lobes), |i, on, reader| {
+        self.each_lobe_frame(context, traced, placed, constants, lobes, |i, on, reader| {
             let outside = self.found.front[i] == 1 || !constants.has_inside();
             let base_bsdf = self.base_bsdf(i, &constants.bsdf, outside);
             let Some(on) = on else { return point_bsdfs.push(base_bsdf) };
@@ -55,7 +55,8 @@ impl ShadingBatch {
         context: &Context,
         traced: TracedRays,
         PlacedMesh { mesh, placement }: PlacedMesh,
-        (constants, lobes): (&MaterialConstants, Lobes),
+        constants: &MaterialConstants,
+        lobes: Lobes,
         mut tell: impl FnMut(usize, Option<&LobeFrame>, &Reader),
     ) {
         let side_by_side = constants

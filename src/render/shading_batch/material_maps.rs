@@ -111,7 +111,7 @@ impl MaterialMaps {
                 }
             }
             let layout = Layout::of(store, map.texture)?;
-            material_maps.groups[group].add(layout, (For::Slot(slot), map.texture, space));
+            material_maps.groups[group].add(layout, For::Slot(slot), map.texture, space);
             if let Slot::Normal = slot {
                 material_maps.normal_map = Some((map.texture, layout));
             }
@@ -125,7 +125,7 @@ impl MaterialMaps {
         for (map, space) in lobe_maps(m) {
             let layout = Layout::of(store, map.texture)?;
             let group = self.group(map)?;
-            self.groups[group].add(layout, (For::Lobe(self.lobes.len()), map.texture, space));
+            self.groups[group].add(layout, For::Lobe(self.lobes.len()), map.texture, space);
             self.lobes.push((*map, space));
         }
         Some(self)
@@ -191,11 +191,11 @@ impl Group {
             }
             places.find(&stack.layout, spots);
             for map in stack.maps.iter().filter(|map| wanted(map)) {
-                places.prefetch(s, store, (map.texture, map.space));
+                places.prefetch(s, store, map.texture, map.space);
             }
             for Map { texture, space, slots, lobes } in stack.maps.iter().filter(|map| wanted(map)) {
                 let mut read = [Vec4::ONE; LANES];
-                places.read(store, (*texture, *space), &mut read[..points]);
+                places.read(store, *texture, *space, &mut read[..points]);
                 slots.iter().for_each(|&slot| texels[slot as usize] = read);
                 lobes.iter().for_each(|&lobe| of_lobes[lobe].as_chunks_mut().0[start / LANES] = read);
             }
@@ -220,7 +220,7 @@ impl Group {
         }
     }
 
-    fn add(&mut self, layout: Layout, (what, texture, space): (For, u32, ColorSpace)) {
+    fn add(&mut self, layout: Layout, what: For, texture: u32, space: ColorSpace) {
         let known = self.stacks.iter().position(|stack| stack.layout == layout).unwrap_or_else(|| {
             self.stacks.push(Stack { layout, maps: Vec::new() });
             self.stacks.len() - 1
@@ -285,7 +285,8 @@ impl ShadingBatch {
     pub(super) fn read_material_maps(
         &mut self,
         context: &Context,
-        (material, material_maps): (&Material, &MaterialMaps),
+        material: &Material,
+        material_maps: &MaterialMaps,
         PlacedMesh { mesh, placement }: PlacedMesh,
         widens: bool,
     ) {
@@ -366,24 +367,24 @@ impl Kernel for Read<'_> {
             let points = (count - start).min(LANES);
             let reads_lobes = !outside_alone || front[start..start + points].contains(&1);
             if let Some(group) = material_maps.groups.first() {
-                spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.uvs(i));
+                spread(&mut spots, given, cones, start, group.transform.offset, |i| given.faces.uvs(i));
                 group.read(s, store, (places, &spots), (&mut texels, points), (of_lobes, start, reads_lobes));
             }
             for group in material_maps.groups.iter().skip(1) {
                 let mut spots = Spots::default();
-                spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.other_uvs(i));
+                spread(&mut spots, given, cones, start, group.transform.offset, |i| given.faces.other_uvs(i));
                 group.read(s, store, (places, &spots), (&mut texels, points), (of_lobes, start, reads_lobes));
             }
             for i in start..start + points {
                 let vertex =
                     if colored { mixed_color(given.faces.colors(i), given.corner_weights(i)) } else { Vec4::ONE };
-                inputs(painted, i, (material, vertex), |slot| texels[slot as usize][i - start]);
+                inputs(painted, i, material, vertex, |slot| texels[slot as usize][i - start]);
             }
             if let Some(((texture, layout), reach)) = turns {
                 let mut narrow = [false; LANES];
                 (0..points).for_each(|lane| narrow[lane] = painted.has_narrow_highlight(start + lane));
                 if narrow != [false; LANES] {
-                    let [along, across] = changes(store, (*texture, layout), &spots, reach, narrow);
+                    let [along, across] = changes(store, *texture, layout, &spots, reach, narrow);
                     for lane in 0..points {
                         cones.turning[start + lane] = turning_of([along[lane], across[lane]], material.normal_scale);
                     }
@@ -397,8 +398,10 @@ impl Kernel for Read<'_> {
 #[inline(always)]
 fn spread(
     spots: &mut Spots,
-    (given, cones): (&Given, &Cones),
-    (start, offset): (usize, Vec2),
+    given: &Given,
+    cones: &Cones,
+    start: usize,
+    offset: Vec2,
     uvs: impl Fn(usize) -> [Vec2; 3],
 ) {
     for lane in 0..LANES {
@@ -414,7 +417,7 @@ fn spread(
 
 /// Computes the material at a point from its maps and vertex colour.
 #[inline(always)]
-fn inputs(painted: &mut Painted, i: usize, (material, vertex): (&Material, Vec4), texel: impl Fn(Slot) -> Vec4) {
+fn inputs(painted: &mut Painted, i: usize, material: &Material, vertex: Vec4, texel: impl Fn(Slot) -> Vec4) {
     let base = base_color(material, texel(Slot::Base), texel(Slot::Opacity).x, vertex);
     painted.coverage[i] = material.alpha_mode.covers(base.w);
     let base = base.truncate();

@@ -77,7 +77,7 @@ impl ShadingBatch {
         let occlusion_of_all = unmapped.inputs().occlusion;
         let mut over = self.overlays.take().unwrap_or_default();
         (over.has_sheen, over.has_coat) = (m.sheen.is_some(), m.coat.is_some());
-        self.each_lobe_frame(context, traced, placed, (constants, lobes), |i, on, reader| {
+        self.each_lobe_frame(context, traced, placed, constants, lobes, |i, on, reader| {
             let Some(on) = on else { return over.put(i, &(None, None)) };
             let occlusion = if self.painted.any { self.painted.occlusion[i] } else { occlusion_of_all };
             let (sheen, mut coat) = overlays(m, on, occlusion, reader);

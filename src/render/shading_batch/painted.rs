@@ -194,7 +194,7 @@ impl ShadingBatch {
         if let Some(material_maps) =
             constants.material_maps.as_ref().filter(|material_maps| material_maps.covers(placed.mesh))
         {
-            self.read_material_maps(context, (material, material_maps), placed, widens);
+            self.read_material_maps(context, material, material_maps, placed, widens);
             return;
         }
         let (mut prim, mut patch) = (NO_PRIM, None);
@@ -229,7 +229,7 @@ impl ShadingBatch {
             let outward = if self.found.front[i] == 1 { geometric } else { -geometric };
             let own = patch.normal().unwrap_or(outward);
             let normal =
-                mapped_normal(patch, material, context.textures, own, (side_of(own, geometric), geometric), view);
+                mapped_normal(patch, material, context.textures, own, side_of(own, geometric), geometric, view);
             put(&mut self.found.normal, i, normal);
         }
         if let Some(map) = material.normal_map.as_ref().filter(|_| widens && self.painted.has_narrow_highlight(i)) {

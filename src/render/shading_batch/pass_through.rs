@@ -18,7 +18,8 @@ impl ShadingBatch {
     /// both, by the index of the traced ray; `reads` tells whether maps or vertices were read.
     pub(crate) fn thin_out(
         &mut self,
-        (constants, reads): (&MaterialConstants, bool),
+        constants: &MaterialConstants,
+        reads: bool,
         mut tell: impl FnMut(usize, PassThrough),
     ) {
         let Self { count, rays, weights, found, painted, .. } = self;

@@ -34,7 +34,8 @@ pub(in crate::render) struct RayMedia {
 /// that must arrive unrefracted ends at glass, except for the surface that it has left.
 pub(in crate::render) fn weaken(
     context: &Context,
-    (ray, unbent): (&Ray, Option<&Hit>),
+    ray: &Ray,
+    unbent: Option<&Hit>,
     crossed: &mut Hit,
     FilterHit { hit, left }: &FilterHit,
     light: &mut Vec3,
@@ -235,8 +236,7 @@ pub(in crate::render) fn filter_at(
     let filter = shadow_filter(target.material, &reader);
     let Some((ray_media, table)) = ray_media.filter(|_| has_inside(target.material)) else { return filter };
     let entering = Surface::new(context.world, *target, ray, hit, 0.0).front;
-    let front = (target.material_id, entering);
-    filter * ray_media.cross((table, &context.absorption), front, ray, hit)
+    filter * ray_media.cross(table, &context.absorption, target.material_id, entering, ray, hit)
 }
 
 impl RayMedia {
@@ -248,8 +248,10 @@ impl RayMedia {
     /// Crosses the surface of a material; returns the transmittance of the medium before it.
     fn cross(
         &mut self,
-        (table, absorption): (&mut MediaTable, &Absorption),
-        (material, entering): (u32, bool),
+        table: &mut MediaTable,
+        absorption: &Absorption,
+        material: u32,
+        entering: bool,
         ray: &Ray,
         hit: &Hit,
     ) -> Vec3 {
@@ -281,7 +283,7 @@ mod tests {
         let (mut table, mut ray_media) = (MediaTable::default(), RayMedia::of(Media::OUTSIDE));
         let absorption = Absorption::from(vec![THIN, DENSE]);
         let cross = |&(t, which, entering): &(f32, u32, bool)| {
-            ray_media.cross((&mut table, &absorption), (which, entering), &ray, &Hit { t, ..Hit::MISS })
+            ray_media.cross(&mut table, &absorption, which, entering, &ray, &Hit { t, ..Hit::MISS })
         };
         crossings.iter().map(cross).product()
     }

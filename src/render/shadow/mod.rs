@@ -110,7 +110,8 @@ impl ShadowQueue {
     /// Traces all rays and passes arriving light to `arrive`, as (sample or tag, light) in the order of the rays.
     pub(crate) fn trace<A: Accel, P: Observer>(
         &mut self,
-        (context, media): (&Context, &mut MediaTable),
+        context: &Context,
+        media: &mut MediaTable,
         caster: &mut RayCaster<A>,
         probe: &mut P,
         mut arrive: impl FnMut(u32, Vec3),
@@ -132,7 +133,7 @@ impl ShadowQueue {
                 self.going.extend((0..self.rays.len()).filter(|&i| !occluded[i]));
             }
         }
-        self.go_through((context, media), caster, probe);
+        self.go_through(context, media, caster, probe);
         let open = self.light.iter().zip(&self.occluded).filter(|(_, occluded)| !**occluded);
         open.for_each(|(light, _)| arrive(light.tag, light.radiance));
         self.clear();
@@ -156,7 +157,8 @@ impl ShadowQueue {
             for passed in &self.in_order {
                 weaken(
                     context,
-                    (&self.rays[i], self.unbent.get(i)),
+                    &self.rays[i],
+                    self.unbent.get(i),
                     &mut crossed,
                     passed,
                     light,
@@ -173,7 +175,8 @@ impl ShadowQueue {
     /// Traces the rays that go on, one surface of each at a time.
     fn go_through<A: Accel, P: Observer>(
         &mut self,
-        (context, media): (&Context, &mut MediaTable),
+        context: &Context,
+        media: &mut MediaTable,
         caster: &mut RayCaster<A>,
         probe: &mut P,
     ) {
@@ -243,7 +246,7 @@ impl ShadowQueue {
             }
             let (ray, light, mut crossed) = (self.on_way[k], &mut self.light[i].radiance, self.crossed[k]);
             let ray_media = self.ray_media.get_mut(i).map(|ray_media| (ray_media, &mut *media));
-            weaken(context, (&ray, self.unbent.get(i)), &mut crossed, &hit.into(), light, ray_media);
+            weaken(context, &ray, self.unbent.get(i), &mut crossed, &hit.into(), light, ray_media);
             self.occluded[i] = is_dark(*light);
             if self.occluded[i] {
                 continue;

@@ -42,12 +42,7 @@ impl Sky {
 
     /// Passes the background behind the eye rays with these numbers to `tell`, in order, as [`Self::behind`] has it; directions
     /// are given by axis, cones as radians across.
-    pub(crate) fn each_behind(
-        &self,
-        rays: &[u32],
-        (dirs, angles): ([&[f32]; 3], &[f32]),
-        mut tell: impl FnMut(u32, Vec3),
-    ) {
+    pub(crate) fn each_behind(&self, rays: &[u32], dirs: [&[f32]; 3], angles: &[f32], mut tell: impl FnMut(u32, Vec3)) {
         let dir = |i: u32| Vec3::new(dirs[0][i as usize], dirs[1][i as usize], dirs[2][i as usize]);
         let Some(up) = self.studio() else {
             let behind = |i: u32| self.behind(dir(i).try_normalize().unwrap_or(Vec3::Z), angles[i as usize]);
@@ -151,7 +146,7 @@ mod tests {
                 for numbers in [(0..101).collect(), (0..101).filter(|i| i % 50 != 7).collect::<Vec<u32>>()] {
                     let columns = columns.each_ref().map(|column| &column[..]);
                     let mut told = Vec::new();
-                    sky.each_behind(&numbers, (columns, &angles), |ray, seen| told.push((ray, bits(seen))));
+                    sky.each_behind(&numbers, columns, &angles, |ray, seen| told.push((ray, bits(seen))));
                     let alone = numbers.iter().map(|&i| {
                         let (_, dir, angle) = rays[i as usize];
                         (i, bits(sky.behind(dir.try_normalize().unwrap_or(Vec3::Z), angle)))

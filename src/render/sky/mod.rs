@@ -285,7 +285,7 @@ mod tests {
         let (dir, columns) = (Vec3::new(0.6, 0.0, 0.8), [[0.6], [0.0], [0.8]]);
         assert_eq!(bright.behind(dir, 0.0), 8.0 * sky.behind(dir, 0.0));
         let mut told = Vec3::ZERO;
-        bright.each_behind(&[0], (columns.each_ref().map(|row| &row[..]), &[0.0]), |_, wall| told = wall);
+        bright.each_behind(&[0], columns.each_ref().map(|row| &row[..]), &[0.0], |_, wall| told = wall);
         assert_eq!(told, bright.behind(dir, 0.0));
         assert_eq!((bright.radiance(dir, 0.0), bright.diffuse(dir)), (sky.radiance(dir, 0.0), sky.diffuse(dir)));
     }

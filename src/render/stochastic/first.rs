@@ -53,7 +53,7 @@ impl Sampler<'_> {
             }
         } else {
             for (columns, rows) in columns.chunks(TOGETHER).zip(rows.chunks(TOGETHER)) {
-                places.trace_each(self.frame, self.how, tracer, (0, columns, rows))?;
+                places.trace_each(self.frame, self.how, tracer, 0, columns, rows)?;
                 samples.extend_from_slice(&tracer.samples);
                 by_chance.extend_from_slice(&tracer.by_chance);
                 firsts.extend_from_slice(&tracer.firsts);

@@ -130,9 +130,9 @@ impl<'a> Sampler<'a> {
             if course.active.is_empty() {
                 break;
             }
-            self.trace(tracer, &mut course.places, (&mut course.pixels, &course.active), from..to)?;
+            self.trace(tracer, &mut course.places, &mut course.pixels, &course.active, from..to)?;
             if round < looks(&self.rounds) {
-                self.judge_neighbors(tracer, &mut course, first, (round, from..to))?;
+                self.judge_neighbors(tracer, &mut course, first, round, from..to)?;
             }
             if to >= FIRST_LOOK {
                 self.look(tracer, &mut course, to)?;
@@ -157,7 +157,7 @@ impl<'a> Sampler<'a> {
         let (mut pixels, mut done) = (Vec::with_capacity(around.tile.pixels()), self.nothing(tile));
         if self.starts_with_one() {
             let known = self.grown(tile, reach.saturating_sub(1));
-            self.take_first(first, &mut around, known, (&mut pixels, &mut done));
+            self.take_first(first, &mut around, known, &mut pixels, &mut done);
         } else {
             around.tile.places().for_each(|at| {
                 around.know(at, pixels.len());
@@ -175,7 +175,8 @@ impl<'a> Sampler<'a> {
         tracer: &mut Tracer<A, P>,
         course: &mut Course,
         first: &[&First],
-        (round, samples): (usize, Range<u32>),
+        round: usize,
+        samples: Range<u32>,
     ) -> Option<()> {
         let Course { tile, around, pixels, active, places, .. } = course;
         let (judge, reach) = (&self.judge, self.reach());
@@ -184,8 +185,8 @@ impl<'a> Sampler<'a> {
         let mut news = if samples.start > 0 { active.clone() } else { Vec::new() };
         while !news.is_empty() {
             let open = |at| self.opened(first, at);
-            news = around.reopen(judge, pixels, (&news, samples.start), known, open);
-            self.trace(tracer, places, (pixels, &news), samples.clone())?;
+            news = around.reopen(judge, pixels, &news, samples.start, known, open);
+            self.trace(tracer, places, pixels, &news, samples.clone())?;
             around.see(judge, pixels, &news);
             active.extend(&news);
         }
@@ -203,10 +204,10 @@ impl<'a> Sampler<'a> {
         around.look(&self.judge, pixels, active, errors);
         let mut news = active.clone();
         while !news.is_empty() {
-            news = around.late(&self.judge, pixels, (&news, samples), *tile);
+            news = around.late(&self.judge, pixels, &news, samples, *tile);
             // Those that already have as many samples are still active.
             active.extend(news.iter().filter(|&&i| pixels[i].facts.count < samples));
-            self.catch_up(tracer, places, (pixels, &news), samples)?;
+            self.catch_up(tracer, places, pixels, &news, samples)?;
             around.look(&self.judge, pixels, &news, errors);
         }
         Some(())
@@ -231,7 +232,8 @@ impl<'a> Sampler<'a> {
         first: &[&First],
         around: &mut Neighborhood,
         known: Tile,
-        (pixels, done): (&mut Vec<Pixel>, &mut TilePixels),
+        pixels: &mut Vec<Pixel>,
+        done: &mut TilePixels,
     ) {
         let mut even = around.even(&self.judge, known);
         if let Some(fireflies) = self.fireflies {
@@ -319,23 +321,19 @@ impl<'a> Sampler<'a> {
         &self,
         tracer: &mut Tracer<A, P>,
         places: &mut Places,
-        (pixels, late): (&mut [Pixel], &[usize]),
+        pixels: &mut [Pixel],
+        late: &[usize],
         samples: u32,
     ) -> Option<()> {
         for (&from, &to) in self.rounds.iter().zip(&self.rounds[1..]).filter(|(_, to)| **to <= samples) {
             let now: Vec<usize> = late.iter().copied().filter(|&i| pixels[i].facts.count == from).collect();
-            self.trace(tracer, places, (pixels, &now), from..to)?;
+            self.trace(tracer, places, pixels, &now, from..to)?;
         }
         Some(())
     }
 
     /// Gives active pixels those of these samples that were traced before the picture; returns the rest.
-    fn give_known(
-        &self,
-        (pixels, active): (&mut [Pixel], &[usize]),
-        samples: Range<u32>,
-        in_group: usize,
-    ) -> Range<u32> {
+    fn give_known(&self, pixels: &mut [Pixel], active: &[usize], samples: Range<u32>, in_group: usize) -> Range<u32> {
         let Some(ahead) = self.ahead else { return samples };
         let known = samples.start..samples.start + self.known(samples.clone());
         for &pixel in active.iter().filter(|_| !known.is_empty()) {
@@ -352,7 +350,8 @@ impl<'a> Sampler<'a> {
         &self,
         tracer: &mut Tracer<A, P>,
         places: &mut Places,
-        (pixels, active): (&mut [Pixel], &[usize]),
+        pixels: &mut [Pixel],
+        active: &[usize],
         samples: Range<u32>,
     ) -> Option<()> {
         if samples.start as usize >= GROUPS {
@@ -360,7 +359,7 @@ impl<'a> Sampler<'a> {
         }
         let first = samples.start;
         let in_group = (samples.end as usize).div_ceil(GROUPS);
-        let samples = self.give_known((pixels, active), samples, in_group);
+        let samples = self.give_known(pixels, active, samples, in_group);
         if samples.is_empty() {
             return Some(());
         }
@@ -372,7 +371,7 @@ impl<'a> Sampler<'a> {
                     let pixel = &pixels[pixel];
                     samples.clone().map(|i| pixel.wanted(i))
                 });
-                places.trace(self.frame, self.how, tracer, (Roulette::after(first, self.how), wanted))?;
+                places.trace(self.frame, self.how, tracer, Roulette::after(first, self.how), wanted)?;
                 for (k, &pixel) in some.iter().enumerate() {
                     let of_pixel = k * each..(k + 1) * each;
                     let firsts = tracer.firsts.get(of_pixel.clone()).unwrap_or_default();

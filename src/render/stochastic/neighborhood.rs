@@ -126,7 +126,8 @@ impl Neighborhood {
         &self,
         judge: &Certainty,
         pixels: &mut [Pixel],
-        (some, samples): (&[usize], u32),
+        some: &[usize],
+        samples: u32,
         tile: Tile,
     ) -> Vec<usize> {
         let (mut late, mut asked) = (Vec::new(), vec![false; pixels.len()]);
@@ -157,7 +158,8 @@ impl Neighborhood {
         &mut self,
         judge: &Certainty,
         pixels: &mut Vec<Pixel>,
-        (some, samples): (&[usize], u32),
+        some: &[usize],
+        samples: u32,
         tile: Tile,
         open: impl Fn((u32, u32)) -> Pixel,
     ) -> Vec<usize> {
@@ -215,7 +217,7 @@ mod tests {
     const TILE: Tile = Tile { x0: 4, y0: 7, x1: 7, y1: 10 };
 
     fn judge() -> Certainty<'static> {
-        Certainty::new(None, (None, false), false, 0.05, factor(0.95))
+        Certainty::new(None, None, false, false, 0.05, factor(0.95))
     }
 
     /// Pixels of a tile, each with `samples`, every second of which is lighter by `step`.
@@ -294,14 +296,14 @@ mod tests {
         let (mut around, mut pixels) = pixels(TILE, GROUPS, |_| 0.0);
         look(&mut around, &mut pixels, &(0..9).collect::<Vec<_>>());
         let some: Vec<usize> = (0..9).filter(|&i| i != 4).collect();
-        assert!(around.late(&judge, &mut pixels, (&some, 16), TILE).is_empty());
+        assert!(around.late(&judge, &mut pixels, &some, 16, TILE).is_empty());
         for &i in &some {
             pixels[i].join_groups();
             pixels[i].take(&[Sample { radiance: Vec3::ONE, through: Vec3::ZERO }; GROUPS], &[], 2);
             pixels[i].facts.end = End::Open;
         }
         look(&mut around, &mut pixels, &some);
-        assert_eq!(around.late(&judge, &mut pixels, (&some, 16), TILE), [4]);
+        assert_eq!(around.late(&judge, &mut pixels, &some, 16, TILE), [4]);
         assert!(pixels[4].facts.end == End::Open);
     }
 }

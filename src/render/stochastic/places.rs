@@ -39,7 +39,8 @@ impl Places {
         frame: &Frame,
         how: &Stochastic,
         tracer: &mut Tracer<A, P>,
-        (roulette, wanted): (Roulette, impl Iterator<Item = Wanted>),
+        roulette: Roulette,
+        wanted: impl Iterator<Item = Wanted>,
     ) -> Option<()> {
         self.clear();
         let Self { keys, indices, x, y } = self;
@@ -59,7 +60,9 @@ impl Places {
         frame: &Frame,
         how: &Stochastic,
         tracer: &mut Tracer<A, P>,
-        (index, columns, rows): (u32, &[u32], &[u32]),
+        index: u32,
+        columns: &[u32],
+        rows: &[u32],
     ) -> Option<()> {
         self.clear();
         let Self { keys, indices, x, y } = self;

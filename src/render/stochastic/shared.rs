@@ -24,7 +24,8 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 pub(in crate::render) fn render_all<A: Accel, P: Observer>(
     frame: &Frame,
     how: &Stochastic,
-    (context, accel): (&Context, &A),
+    context: &Context,
+    accel: &A,
     progress: &dyn Progress,
     tiles: &[Tile],
     keep: &(impl Fn(TilePixels) + Sync),

@@ -210,7 +210,7 @@ impl<'a> Surface<'a> {
         if patch.is_curved() {
             self.horizon = facing(self.smooth, self.geometric, self.view);
         }
-        self.normal = mapped_normal(patch, material, store, own, (side, self.geometric), self.view);
+        self.normal = mapped_normal(patch, material, store, own, side, self.geometric, self.view);
     }
 
     /// 1 for a normal on the visible side, −1 for one on the other.
@@ -325,7 +325,8 @@ pub(crate) fn mapped_normal(
     material: &Material,
     store: &TextureStore,
     own: Vec3,
-    (side, geometric): (f32, Vec3),
+    side: f32,
+    geometric: Vec3,
     view: Vec3,
 ) -> Vec3 {
     let turned = |map| patch.normal_mapped(own, map, material.normal_scale, store);

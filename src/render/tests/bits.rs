@@ -206,7 +206,7 @@ fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one()
         let mut s = painted();
         let store = TextureStore::new(&s.scene);
         let beside = |m: &Material| {
-            MaterialConstants::of((0, m), &store, depth > 0, Gloss::new(None)).is_some_and(|constants| constants.mapped)
+            MaterialConstants::of(0, m, &store, depth > 0, Gloss::new(None)).is_some_and(|constants| constants.mapped)
         };
         assert!(s.scene.materials.iter().all(beside), "nothing would be compared");
         (s.settings.depth, s.scene.environment) = (Some(depth), environment);
@@ -327,7 +327,7 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
         let mut s = glazed(if textures > 0 { painted() } else { plain() }, textures);
         let store = TextureStore::new(&s.scene);
         let beside = |m: &&Material| {
-            MaterialConstants::of((0, m), &store, true, Gloss::new(None))
+            MaterialConstants::of(0, m, &store, true, Gloss::new(None))
                 .is_some_and(|constants| constants.glass.is_some())
         };
         // Materials that scatter light inside are shaded one by one.
@@ -415,7 +415,7 @@ fn lobes_shaded_side_by_side_have_the_bits_of_lobes_shaded_one_by_one() {
         (s.settings.depth, s.settings.env_rays, s.scene.environment) = (Some(depth), env_rays, environment);
         let store = TextureStore::new(&s.scene);
         let beside = |m: &&Material| {
-            MaterialConstants::of((0, m), &store, true, Gloss::new(None))
+            MaterialConstants::of(0, m, &store, true, Gloss::new(None))
                 .is_some_and(|constants| constants.lobes.is_some())
         };
         assert!(s.scene.materials.iter().filter(beside).count() >= 5, "nothing would be compared");
@@ -469,7 +469,7 @@ fn sheen_and_coat_over_points_side_by_side_have_the_bits_of_those_over_points_on
         (s.settings.depth, s.settings.env_rays, s.scene.environment) = (Some(depth), env_rays, environment);
         let store = TextureStore::new(&s.scene);
         let are_overlays = |m: &&Material| {
-            let constants = MaterialConstants::of((0, m), &store, true, Gloss::new(None));
+            let constants = MaterialConstants::of(0, m, &store, true, Gloss::new(None));
             constants.and_then(|constants| constants.lobes).is_some_and(|lobes| lobes.are_overlays)
         };
         assert!(s.scene.materials.iter().filter(are_overlays).count() >= 4, "nothing would be compared");
@@ -485,7 +485,7 @@ fn rough_surfaces_that_spread_rays_have_the_same_bits_side_by_side() {
         s.scene.environment = Environment::Studio;
         let store = TextureStore::new(&s.scene);
         let beside = |m: &&Material| {
-            MaterialConstants::of((0, m), &store, true, Gloss::new(Some(2))).is_some_and(|constants| constants.spreads)
+            MaterialConstants::of(0, m, &store, true, Gloss::new(Some(2))).is_some_and(|constants| constants.spreads)
         };
         assert!(s.scene.materials.iter().filter(beside).count() >= 5, "nothing would be compared");
         let together = same_one_by_one(&mut s, &format!("{textures} textures, depth {depth}"));

@@ -61,7 +61,8 @@ impl Layout {
 #[inline(always)]
 pub(crate) fn changes(
     store: &TextureStore,
-    (texture, layout): (u32, &Layout),
+    texture: u32,
+    layout: &Layout,
     at: &Spots,
     reach: f32,
     wanted: [bool; LANES],
@@ -260,7 +261,7 @@ impl Places {
 
     /// Linear RGBA (straight alpha) of a texture of the layout, at as many points as `to` has.
     #[inline(always)]
-    pub(crate) fn read(&self, store: &TextureStore, (texture, space): (u32, ColorSpace), to: &mut [Vec4]) {
+    pub(crate) fn read(&self, store: &TextureStore, texture: u32, space: ColorSpace, to: &mut [Vec4]) {
         let Some((sampler, source)) = store.find(texture) else { return };
         let lookup = source.lookup(space, sampler);
         // Neighbouring points mostly read the same levels.
@@ -281,7 +282,7 @@ impl Places {
 
     /// Prefetches most texels of [`Self::read`]: where all maps of a layout are prefetched first, none waits for memory.
     #[inline(always)]
-    pub(crate) fn prefetch<S: Simd>(&self, s: S, store: &TextureStore, (texture, space): (u32, ColorSpace)) {
+    pub(crate) fn prefetch<S: Simd>(&self, s: S, store: &TextureStore, texture: u32, space: ColorSpace) {
         let Some((sampler, source)) = store.find(texture) else { return };
         let lookup = source.lookup(space, sampler);
         for above in 0..=self.between[0] as usize {

@@ -71,7 +71,7 @@ impl Survey {
         if cells[0] * cells[1] > MOST {
             return None;
         }
-        let [filled, open] = cells_of(bitmap, (channel, codes), side, cells)?;
+        let [filled, open] = cells_of(bitmap, channel, codes, side, cells)?;
         let has_gaps = filled.contains(&false);
         if !has_gaps && !open.contains(&false) {
             return None;
@@ -169,7 +169,8 @@ fn reach(len: usize, level: usize) -> f32 {
 /// channel that is constant.
 fn cells_of(
     bitmap: &Bitmap,
-    (channel, Codes { most, least }): (usize, Codes),
+    channel: usize,
+    Codes { most, least }: Codes,
     side: usize,
     cells: [usize; 2],
 ) -> Option<[Vec<bool>; 2]> {
@@ -296,7 +297,8 @@ mod tests {
     fn spotted(
         random: &mut Random,
         ((width, height), sampler): ((u32, u32), Sampler),
-        (codes, spot): (RangeInclusive<u8>, u8),
+        codes: RangeInclusive<u8>,
+        spot: u8,
     ) -> Scene {
         let mut texels = vec![[200, 100, 50, 0]; (width * height) as usize];
         let count = usize::from(codes.end() - codes.start()) + 1;
@@ -335,7 +337,7 @@ mod tests {
         let (mut clear_ones, mut all) = (0, 0);
         for (round, (size, sampler)) in kinds().enumerate() {
             let most = [0, 100][round % 2];
-            let scene = spotted(&mut random, (size, sampler), (0..=most, 255));
+            let scene = spotted(&mut random, (size, sampler), 0..=most, 255);
             let store = TextureStore::new(&scene);
             let clear = Survey::of(&store, 0, 3, Codes { most, least: 256 }).unwrap();
             for _ in 0..3000 {
@@ -367,7 +369,7 @@ mod tests {
         let (mut solid_ones, mut all) = (0, 0);
         for (round, (size, sampler)) in kinds().enumerate() {
             let least = [255, 128][round % 2];
-            let scene = spotted(&mut random, (size, sampler), (least..=255, least - 1));
+            let scene = spotted(&mut random, (size, sampler), least..=255, least - 1);
             let store = TextureStore::new(&scene);
             let solid = Survey::of(&store, 0, 3, Codes { most: 9, least: least.into() }).unwrap();
             assert!(!solid.has_gaps());

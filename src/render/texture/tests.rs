@@ -248,10 +248,10 @@ fn compare(store: &TextureStore, layout: &Layout, spots: &Spots, reach: f32) {
     let bits = |texel: Vec4| texel.to_array().map(f32::to_bits);
     let mut places = Places::default();
     places.find(layout, spots);
-    let found = changes(store, (0, layout), spots, reach, [true; LANES]);
+    let found = changes(store, 0, layout, spots, reach, [true; LANES]);
     for space in [ColorSpace::Srgb, ColorSpace::Linear] {
         let mut texels = [Vec4::NAN; LANES];
-        places.read(store, (0, space), &mut texels);
+        places.read(store, 0, space, &mut texels);
         for i in 0..LANES {
             let (uv, along, across) = (at(&spots.uv, i), at(&spots.along, i), at(&spots.across, i));
             let single = store.sample(0, space, uv, along, across);
