@@ -268,7 +268,7 @@ fn one_light_ray_a_sample_finds_the_brightness_that_many_find() {
 }
 
 /// Statistics of the pixels that the criterion stopped after estimating a variance other than 0.
-struct InstancedObjects {
+struct StoppedPixels {
     stopped: usize,
     within: usize,
     /// Pixels whose error is less than a quarter of the allowed one, and the share of all rays spent on them.
@@ -277,7 +277,7 @@ struct InstancedObjects {
 }
 
 /// Renders the soft scene and compares each pixel's written values with those of a converged picture.
-fn kept(width: u32, height: u32, error: f32, reference: u32) -> InstancedObjects {
+fn kept(width: u32, height: u32, error: f32, reference: u32) -> StoppedPixels {
     let mut s = soft();
     (s.settings.width, s.settings.height) = (width, height);
     let output = crate::image::Output { background: Some([0.1, 0.2, 0.3]), ..Default::default() };
@@ -292,7 +292,7 @@ fn kept(width: u32, height: u32, error: f32, reference: u32) -> InstancedObjects
     s.settings.gloss_rays = Some(reference);
     s.settings.sampling = Sampling::Stochastic(whole);
     let truth = rendered(&s);
-    let mut kept = InstancedObjects { stopped: 0, within: 0, far_above: 0, wasted: 0.0 };
+    let mut kept = StoppedPixels { stopped: 0, within: 0, far_above: 0, wasted: 0.0 };
     let sampled = &found.sampled;
     for (i, (a, b)) in found.picture.beauty.iter().zip(&truth.picture.beauty).enumerate() {
         if sampled.counts[i] < 8 || sampled.counts[i] >= 4096 || sampled.errors[i] == 0.0 {
