@@ -16,7 +16,7 @@ use super::frame::{Frame, pixel_key};
 use super::observer::Observer;
 use super::roulette::Roulette;
 use super::sampling::{Sampling, Stochastic};
-use super::stochastic::{Places, Wanted};
+use super::stochastic::{SampleBatch, SampleRequest};
 use super::tile::{TILE, TOGETHER, Tile, TracedTiles, each_tile, tiles};
 use super::whitted::{Sample, Tracer};
 use super::{Job, Progress, Settings};
@@ -265,9 +265,9 @@ impl Question<'_> {
     ) -> Option<Vec<Vec<Answer>>> {
         let is_asked = |(x, y): &(u32, u32)| x % self.step == 0 && y % self.step == 0;
         let (columns, rows): (Vec<u32>, Vec<u32>) = tile.places().filter(is_asked).unzip();
-        let mut places = Places::default();
+        let mut batch = SampleBatch::default();
         let each = (0..self.samples).map(|index| {
-            places.trace_each(self.frame, self.how, tracer, index, &columns, &rows)?;
+            batch.trace_each(self.frame, self.how, tracer, index, &columns, &rows)?;
             if let Some(ahead) = ahead {
                 let mut ahead = ahead.lock().unwrap_or_else(PoisonError::into_inner);
                 ahead.keep(index, (&columns, &rows), tracer);
@@ -290,9 +290,13 @@ impl Question<'_> {
         let seed = self.frame.settings.seed;
         let wanted = some.iter().flat_map(|bright| {
             let pixel = bright[0].pixel;
-            (self.samples..self.samples + AGAIN).map(move |index| Wanted { pixel, key: pixel_key(seed, pixel), index })
+            (self.samples..self.samples + AGAIN).map(move |index| SampleRequest {
+                pixel,
+                key: pixel_key(seed, pixel),
+                index,
+            })
         });
-        Places::default().trace(self.frame, self.how, tracer, Roulette::default(), wanted)?;
+        SampleBatch::default().trace(self.frame, self.how, tracer, Roulette::default(), wanted)?;
         let each = some.iter().zip(tracer.samples.chunks(AGAIN as usize));
         let rare = each.flat_map(|(bright, again)| {
             let (x, y) = bright[0].pixel;

@@ -65,7 +65,7 @@ pub(super) struct PixelFacts {
     pub spare: u32,
     /// Standard error, if that was estimated.
     pub error: f32,
-    pub end: End,
+    pub convergence: Convergence,
 }
 
 impl PixelFacts {
@@ -79,11 +79,11 @@ impl PixelFacts {
 
 /// Whether a pixel needs more samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum End {
+pub(super) enum Convergence {
     /// Nothing was estimated.
     Unknown,
     /// Its mean was certain.
-    Met,
+    Converged,
     /// Its mean is not certain: it goes on, or had the most that are allowed.
     Open,
 }
@@ -216,8 +216,8 @@ impl Sampled {
     fn count(&mut self, pixels: &TilePixels) {
         self.rays += pixels.rays;
         for facts in &pixels.facts {
-            self.met += u64::from(facts.end == End::Met);
-            self.at_most += u64::from(facts.end == End::Open);
+            self.met += u64::from(facts.convergence == Convergence::Converged);
+            self.at_most += u64::from(facts.convergence == Convergence::Open);
             self.spare += u64::from(facts.spare);
         }
     }

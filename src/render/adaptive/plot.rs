@@ -7,7 +7,7 @@ use crate::render::frame::{Frame, Sum};
 use crate::render::layers::LayerSum;
 use crate::render::observer::Observer;
 use crate::render::sampling::Adaptive;
-use crate::render::tile::{End, PixelFacts, TOGETHER, Tile, TilePixels};
+use crate::render::tile::{Convergence, PixelFacts, TOGETHER, Tile, TilePixels};
 use crate::render::whitted::{Sample, Tracer};
 use std::ops::Range;
 
@@ -304,7 +304,7 @@ impl Plot {
             points.sort_unstable();
             points.dedup();
             let count = u32::try_from(points.len()).unwrap_or(u32::MAX);
-            done.facts.push(PixelFacts { count, spare: 0, error: 0.0, end: End::Unknown });
+            done.facts.push(PixelFacts { count, spare: 0, error: 0.0, convergence: Convergence::Unknown });
             if frame.settings.layers {
                 let mut sum = LayerSum::default();
                 let five = std::iter::once(self.squares[i].middle).chain(self.squares[i].corners);

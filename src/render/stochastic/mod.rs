@@ -5,10 +5,10 @@
 //! rounds, too. Where pixels start with one sample, tiles share these ([`shared`]); all further samples this tile traces for
 //! itself, and counts: which they are depends on the whole tile, and no tile may wait for another to finish.
 
-mod first;
+mod first_samples;
 mod neighborhood;
 mod pixel;
-mod places;
+mod sample_batch;
 mod shared;
 mod variances;
 
@@ -22,19 +22,19 @@ use super::layers::LayerPixel;
 use super::observer::Observer;
 use super::roulette::Roulette;
 use super::sampling::Stochastic;
-use super::tile::{End, PixelFacts, TOGETHER, Tile, TilePixels, put_row};
+use super::tile::{Convergence, PixelFacts, TOGETHER, Tile, TilePixels, put_row};
 use super::whitted::Tracer;
 use crate::accel::Accel;
 use crate::image::Output;
-use first::First;
+use first_samples::FirstSamples;
 use neighborhood::Neighborhood;
 use pixel::Pixel;
-pub(in crate::render) use places::{Places, Wanted};
+pub(in crate::render) use sample_batch::{SampleBatch, SampleRequest};
 pub(super) use shared::render_all;
 use std::ops::Range;
 
 /// Number of samples from which variances are used: one in each group.
-const FIRST_LOOK: u32 = GROUPS as u32;
+const FIRST_VARIANCE: u32 = GROUPS as u32;
 
 /// Renders one tile by itself; `None` when cancelled.
 pub(super) fn render<A: Accel, P: Observer>(
@@ -49,7 +49,7 @@ pub(super) fn render<A: Accel, P: Observer>(
         return sampler.finish(tracer, tile, &[]);
     }
     let outermost = sampler.grown(tile, sampler.reach());
-    let first = sampler.first(tracer, std::iter::once(tile).chain(outermost.without(tile)))?;
+    let first = sampler.trace_first(tracer, std::iter::once(tile).chain(outermost.without(tile)))?;
     let mut done = sampler.finish(tracer, tile, &[&first])?;
     let beyond = if sampler.ahead.is_some() { 0 } else { outermost.pixels() - tile.pixels() };
     done.rays_beyond += beyond as u64;
@@ -72,7 +72,7 @@ struct Sampler<'a> {
 }
 
 /// A tile in progress.
-struct Course {
+struct TileState {
     tile: Tile,
     /// What the samples of the tile and its surroundings show.
     around: Neighborhood,
@@ -81,7 +81,7 @@ struct Course {
     /// Indices of the pixels that go on.
     active: Vec<usize>,
     /// Buffers.
-    places: Places,
+    batch: SampleBatch,
     errors: Vec<f32>,
 }
 
@@ -102,7 +102,7 @@ impl<'a> Sampler<'a> {
     /// Number of rings of pixels around a tile that are sampled: one for each round that compares neighbours and is followed by
     /// another round.
     fn reach(&self) -> usize {
-        looks(&self.rounds).min(self.rounds.len() - 1)
+        neighbor_rounds(&self.rounds).min(self.rounds.len() - 1)
     }
 
     /// A tile grown by so many rings of pixels.
@@ -120,52 +120,52 @@ impl<'a> Sampler<'a> {
         &self,
         tracer: &mut Tracer<A, P>,
         tile: Tile,
-        first: &[&First],
+        first: &[&FirstSamples],
     ) -> Option<TilePixels> {
-        let (mut course, mut done) = self.begin(tile, first);
+        let (mut state, mut done) = self.begin(tile, first);
         // Number of samples that each pixel has already: that of the first round, or none.
         let taken = u32::from(self.starts_with_one());
         let mut from = taken;
         for (round, &to) in self.rounds.iter().enumerate().skip(usize::from(taken == 1)) {
-            if course.active.is_empty() {
+            if state.active.is_empty() {
                 break;
             }
-            self.trace(tracer, &mut course.places, &mut course.pixels, &course.active, from..to)?;
-            if round < looks(&self.rounds) {
-                self.judge_neighbors(tracer, &mut course, first, round, from..to)?;
+            self.trace(tracer, &mut state.batch, &mut state.pixels, &state.active, from..to)?;
+            if round < neighbor_rounds(&self.rounds) {
+                self.judge_neighbors(tracer, &mut state, first, round, from..to)?;
             }
-            if to >= FIRST_LOOK {
-                self.look(tracer, &mut course, to)?;
+            if to >= FIRST_VARIANCE {
+                self.judge_certainty(tracer, &mut state, to)?;
             }
-            course.active.retain(|&i| course.pixels[i].facts.end == End::Open);
+            state.active.retain(|&i| state.pixels[i].facts.convergence == Convergence::Open);
             from = to;
         }
-        for pixel in course.pixels.iter_mut().filter(|pixel| pixel.variance().is_some()) {
-            course.around.compare(pixel);
-            if pixel.facts.end == End::Met {
-                pixel.look(&self.judge);
+        for pixel in state.pixels.iter_mut().filter(|pixel| pixel.variance().is_some()) {
+            state.around.compare(pixel);
+            if pixel.facts.convergence == Convergence::Converged {
+                pixel.judge(&self.judge);
             }
         }
-        self.put(&course.pixels, taken, &mut done);
+        self.put(&state.pixels, taken, &mut done);
         Some(done)
     }
 
     /// State of a tile at the start, and its pixels as far as they are done then.
-    fn begin(&self, tile: Tile, first: &[&First]) -> (Course, TilePixels) {
+    fn begin(&self, tile: Tile, first: &[&FirstSamples]) -> (TileState, TilePixels) {
         let reach = self.reach();
         let mut around = Neighborhood::new(self.grown(tile, reach), first);
-        let (mut pixels, mut done) = (Vec::with_capacity(around.tile.pixels()), self.nothing(tile));
+        let (mut pixels, mut done) = (Vec::with_capacity(around.tile.pixels()), self.empty_tile(tile));
         if self.starts_with_one() {
             let known = self.grown(tile, reach.saturating_sub(1));
             self.take_first(first, &mut around, known, &mut pixels, &mut done);
         } else {
             around.tile.places().for_each(|at| {
-                around.know(at, pixels.len());
+                around.register(at, pixels.len());
                 pixels.push(self.pixel(at));
             });
         }
         let active = (0..pixels.len()).collect();
-        (Course { tile, around, pixels, active, places: Places::default(), errors: Vec::new() }, done)
+        (TileState { tile, around, pixels, active, batch: SampleBatch::default(), errors: Vec::new() }, done)
     }
 
     /// Compares the pixels that go on with their neighbours, after a round of these samples: finished pixels near uneven ones are
@@ -173,22 +173,22 @@ impl<'a> Sampler<'a> {
     fn judge_neighbors<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
-        course: &mut Course,
-        first: &[&First],
+        state: &mut TileState,
+        first: &[&FirstSamples],
         round: usize,
         samples: Range<u32>,
     ) -> Option<()> {
-        let Course { tile, around, pixels, active, places, .. } = course;
+        let TileState { tile, around, pixels, active, batch, .. } = state;
         let (judge, reach) = (&self.judge, self.reach());
         let known = self.grown(*tile, reach.saturating_sub(1));
         around.see(judge, pixels, active);
-        let mut news = if samples.start > 0 { active.clone() } else { Vec::new() };
-        while !news.is_empty() {
-            let open = |at| self.opened(first, at);
-            news = around.reopen(judge, pixels, &news, samples.start, known, open);
-            self.trace(tracer, places, pixels, &news, samples.clone())?;
-            around.see(judge, pixels, &news);
-            active.extend(&news);
+        let mut added = if samples.start > 0 { active.clone() } else { Vec::new() };
+        while !added.is_empty() {
+            let open = |at| self.open_pixel(first, at);
+            added = around.reopen_near_uneven(judge, pixels, &added, samples.start, known, open);
+            self.trace(tracer, batch, pixels, &added, samples.clone())?;
+            around.see(judge, pixels, &added);
+            active.extend(&added);
         }
         // Neighbours of the outermost pixels are unknown.
         let known = self.grown(*tile, reach.saturating_sub(round + 1));
@@ -199,28 +199,33 @@ impl<'a> Sampler<'a> {
 
     /// Estimates the errors of the active pixels, with so many samples; neighbours that seemed certain with fewer, and no longer
     /// are, get as many.
-    fn look<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, course: &mut Course, samples: u32) -> Option<()> {
-        let Course { tile, around, pixels, active, places, errors } = course;
-        around.look(&self.judge, pixels, active, errors);
-        let mut news = active.clone();
-        while !news.is_empty() {
-            news = around.late(&self.judge, pixels, &news, samples, *tile);
+    fn judge_certainty<A: Accel, P: Observer>(
+        &self,
+        tracer: &mut Tracer<A, P>,
+        state: &mut TileState,
+        samples: u32,
+    ) -> Option<()> {
+        let TileState { tile, around, pixels, active, batch, errors } = state;
+        around.estimate_errors(&self.judge, pixels, active, errors);
+        let mut added = active.clone();
+        while !added.is_empty() {
+            added = around.reopen_uncertain(&self.judge, pixels, &added, samples, *tile);
             // Those that already have as many samples are still active.
-            active.extend(news.iter().filter(|&&i| pixels[i].facts.count < samples));
-            self.catch_up(tracer, places, pixels, &news, samples)?;
-            around.look(&self.judge, pixels, &news, errors);
+            active.extend(added.iter().filter(|&&i| pixels[i].facts.count < samples));
+            self.catch_up(tracer, batch, pixels, &added, samples)?;
+            around.estimate_errors(&self.judge, pixels, &added, errors);
         }
         Some(())
     }
 
     /// A tile with empty pixels.
-    fn nothing(&self, tile: Tile) -> TilePixels {
+    fn empty_tile(&self, tile: Tile) -> TilePixels {
         let frame = self.frame;
         let (pixels, layers) = (tile.pixels(), if frame.settings.layers { tile.pixels() } else { 0 });
         TilePixels {
             beauty: vec![[0.0; 4]; pixels],
             veil: vec![[0.0; 4]; if frame.has_veil { pixels } else { 0 }],
-            facts: vec![PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Open }; pixels],
+            facts: vec![PixelFacts { count: 0, spare: 0, error: 0.0, convergence: Convergence::Open }; pixels],
             layers: vec![LayerPixel::new(&[], frame.view.eye, frame.view.forward); layers],
             ..TilePixels::empty(tile)
         }
@@ -229,7 +234,7 @@ impl<'a> Sampler<'a> {
     /// Takes the first sample of every pixel, and of those around the tile that are `known`; opens the pixels that need more.
     fn take_first(
         &self,
-        first: &[&First],
+        first: &[&FirstSamples],
         around: &mut Neighborhood,
         known: Tile,
         pixels: &mut Vec<Pixel>,
@@ -253,8 +258,8 @@ impl<'a> Sampler<'a> {
                 }
                 for (x, at) in (block.x0..block.x1).zip(start..) {
                     if !even.is_even(at) {
-                        around.know((x, y), pixels.len());
-                        pixels.push(self.opened(first, (x, y)));
+                        around.register((x, y), pixels.len());
+                        pixels.push(self.open_pixel(first, (x, y)));
                     }
                 }
             }
@@ -264,7 +269,7 @@ impl<'a> Sampler<'a> {
             let columns = (block.x1 - block.x0) as usize;
             for y in block.y0..block.y1 {
                 let errors = even.errors(around.at((block.x0, y)), columns);
-                let met = |&error: &f32| PixelFacts { count: 1, spare: 0, error, end: End::Met };
+                let met = |&error: &f32| PixelFacts { count: 1, spare: 0, error, convergence: Convergence::Converged };
                 put_row(&mut done.facts[from..from + columns], errors, met);
                 from += columns;
             }
@@ -278,7 +283,7 @@ impl<'a> Sampler<'a> {
     }
 
     /// Opens a pixel with its first sample.
-    fn opened(&self, first: &[&First], at: (u32, u32)) -> Pixel {
+    fn open_pixel(&self, first: &[&FirstSamples], at: (u32, u32)) -> Pixel {
         let mut pixel = self.pixel(at);
         first.iter().for_each(|first| first.give(&mut pixel, self.fireflies));
         pixel
@@ -320,14 +325,14 @@ impl<'a> Sampler<'a> {
     fn catch_up<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
-        places: &mut Places,
+        batch: &mut SampleBatch,
         pixels: &mut [Pixel],
         late: &[usize],
         samples: u32,
     ) -> Option<()> {
         for (&from, &to) in self.rounds.iter().zip(&self.rounds[1..]).filter(|(_, to)| **to <= samples) {
             let now: Vec<usize> = late.iter().copied().filter(|&i| pixels[i].facts.count == from).collect();
-            self.trace(tracer, places, pixels, &now, from..to)?;
+            self.trace(tracer, batch, pixels, &now, from..to)?;
         }
         Some(())
     }
@@ -339,7 +344,7 @@ impl<'a> Sampler<'a> {
         for &pixel in active.iter().filter(|_| !known.is_empty()) {
             let pixel = &mut pixels[pixel];
             let OfPixel { samples, by_chance, firsts } = ahead.of(pixel.at, known.clone());
-            pixel.expect(self.fireflies, by_chance);
+            pixel.expect_fireflies(self.fireflies, by_chance);
             pixel.take(samples, firsts, in_group);
         }
         known.end..samples.end
@@ -349,7 +354,7 @@ impl<'a> Sampler<'a> {
     fn trace<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
-        places: &mut Places,
+        batch: &mut SampleBatch,
         pixels: &mut [Pixel],
         active: &[usize],
         samples: Range<u32>,
@@ -369,14 +374,14 @@ impl<'a> Sampler<'a> {
                 let each = samples.len();
                 let wanted = some.iter().flat_map(|&pixel| {
                     let pixel = &pixels[pixel];
-                    samples.clone().map(|i| pixel.wanted(i))
+                    samples.clone().map(|i| pixel.request(i))
                 });
-                places.trace(self.frame, self.how, tracer, Roulette::after(first, self.how), wanted)?;
+                batch.trace(self.frame, self.how, tracer, Roulette::after(first, self.how), wanted)?;
                 for (k, &pixel) in some.iter().enumerate() {
                     let of_pixel = k * each..(k + 1) * each;
                     let firsts = tracer.firsts.get(of_pixel.clone()).unwrap_or_default();
                     let by_chance = tracer.by_chance.get(of_pixel.clone()).unwrap_or_default();
-                    pixels[pixel].expect(self.fireflies, by_chance);
+                    pixels[pixel].expect_fireflies(self.fireflies, by_chance);
                     pixels[pixel].take(&tracer.samples[of_pixel], firsts, in_group);
                 }
             }
@@ -397,7 +402,7 @@ fn rounds(how: &Stochastic, settings: &Settings, known: u32) -> impl Iterator<It
 }
 
 /// Number of rounds after which neighbours are compared: the first, and then the one in which a pixel gets [`SURE`] samples.
-fn looks(rounds: &[u32]) -> usize {
+fn neighbor_rounds(rounds: &[u32]) -> usize {
     if rounds[0] < SURE { 2 } else { 1 }
 }
 

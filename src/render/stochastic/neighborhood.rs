@@ -3,13 +3,13 @@
 //! Most of a picture is so even that a pixel needs few samples. Whether these suffice is judged by those of its eight neighbours:
 //! all must agree. A detail thinner than a pixel, a wire or the stroke of a letter, shows in some of the pixels that it crosses
 //! and not in others; so wherever a pixel that got more samples turns out to be uneven, all pixels near it get as many, and those
-//! near them if they are uneven, too ([`Neighborhood::reopen`]).
+//! near them if they are uneven, too ([`Neighborhood::reopen_near_uneven`]).
 
-use super::first::First;
+use super::first_samples::FirstSamples;
 use super::pixel::Pixel;
 use super::variances::Variances;
 use crate::render::certainty::{Certainty, Even, GROUPS, Range, Seen, Shown};
-use crate::render::tile::{End, PixelFacts, Tile};
+use crate::render::tile::{Convergence, PixelFacts, Tile};
 
 /// Distance in columns and rows within which pixels are reopened: around a pixel on an edge, and around one with a thin detail,
 /// which the next pixels may well miss.
@@ -34,7 +34,7 @@ pub(super) struct Neighborhood {
 
 impl Neighborhood {
     /// Collects what these first samples show of the pixels of a tile.
-    pub(super) fn new(tile: Tile, first: &[&First]) -> Self {
+    pub(super) fn new(tile: Tile, first: &[&FirstSamples]) -> Self {
         let columns = (tile.x1 - tile.x0 + 2) as usize;
         let places = columns * (tile.y1 - tile.y0 + 2) as usize;
         let (shown, variances) = (Shown::nothing(places), Variances::nothing(columns));
@@ -62,7 +62,7 @@ impl Neighborhood {
     }
 
     /// Registers a pixel under an index; all smaller indices are taken.
-    pub(super) fn know(&mut self, pixel: (u32, u32), number: usize) {
+    pub(super) fn register(&mut self, pixel: (u32, u32), number: usize) {
         let at = self.at(pixel);
         self.numbers[at] = u32::try_from(number).unwrap_or(NONE);
         self.seen.push(self.shown.at(at));
@@ -96,7 +96,13 @@ impl Neighborhood {
     ///
     /// The few samples that hit a light, or see it through glass, make up both a pixel's mean and its error estimate: a pixel in
     /// which hardly any did looks dark and certain. So its samples are taken to vary no less than those of its neighbours.
-    pub(super) fn look(&mut self, judge: &Certainty, pixels: &mut [Pixel], some: &[usize], errors: &mut Vec<f32>) {
+    pub(super) fn estimate_errors(
+        &mut self,
+        judge: &Certainty,
+        pixels: &mut [Pixel],
+        some: &[usize],
+        errors: &mut Vec<f32>,
+    ) {
         errors.clear();
         judge.each_standard_error(some.iter().map(|&i| &pixels[i].groups[..]), |error| errors.push(error));
         for (&i, &error) in some.iter().zip(&*errors) {
@@ -108,7 +114,7 @@ impl Neighborhood {
             // A pixel that is not certain by itself is not certain with its neighbours, either.
             if pixel.used(judge) <= 1.0 {
                 self.compare(pixel);
-                pixel.look(judge);
+                pixel.judge(judge);
             }
         }
     }
@@ -116,13 +122,13 @@ impl Neighborhood {
     /// Raises the variance of a pixel's samples to that of its neighbours.
     pub(super) fn compare(&self, pixel: &mut Pixel) {
         if let Some(own) = pixel.variance() {
-            pixel.take_to_vary(self.variances.no_less_than(own, self.at(pixel.at)));
+            pixel.set_variance(self.variances.no_less_than(own, self.at(pixel.at)));
         }
     }
 
     /// Neighbours in `tile` of these pixels that seemed certain with `samples` or fewer, and are not with the variances known
     /// now.
-    pub(super) fn late(
+    pub(super) fn reopen_uncertain(
         &self,
         judge: &Certainty,
         pixels: &mut [Pixel],
@@ -137,13 +143,16 @@ impl Neighborhood {
                 for x in x.saturating_sub(1).max(tile.x0)..(x + 2).min(tile.x1) {
                     let number = self.numbers[self.at((x, y))] as usize;
                     let Some(stopped) = pixels.get_mut(number) else { continue };
-                    let PixelFacts { end, count, error, .. } = stopped.facts;
-                    if std::mem::replace(&mut asked[number], true) || end != End::Met || count > samples {
+                    let PixelFacts { convergence, count, error, .. } = stopped.facts;
+                    if std::mem::replace(&mut asked[number], true)
+                        || convergence != Convergence::Converged
+                        || count > samples
+                    {
                         continue;
                     }
                     self.compare(stopped);
                     if stopped.facts.error > error && stopped.used(judge) > 1.0 {
-                        (stopped.facts.end, stopped.facts.spare) = (End::Open, 0);
+                        (stopped.facts.convergence, stopped.facts.spare) = (Convergence::Open, 0);
                         late.push(number);
                     }
                 }
@@ -154,7 +163,7 @@ impl Neighborhood {
 
     /// Opens the pixels of `tile` that were done with `samples` and lie near uneven ones among `some`: those with one sample,
     /// which get an index now, and those with more, which have one; returns their indices.
-    pub(super) fn reopen(
+    pub(super) fn reopen_near_uneven(
         &mut self,
         judge: &Certainty,
         pixels: &mut Vec<Pixel>,
@@ -175,11 +184,11 @@ impl Neighborhood {
                 for x in x.saturating_sub(reach).max(tile.x0)..(x + reach + 1).min(tile.x1) {
                     let mut number = self.numbers[self.at((x, y))] as usize;
                     match pixels.get_mut(number) {
-                        Some(pixel) if pixel.is_done_with(samples) => pixel.facts.end = End::Open,
+                        Some(pixel) if pixel.is_done_with(samples) => pixel.facts.convergence = Convergence::Open,
                         Some(_) => continue,
                         None => {
                             number = pixels.len();
-                            self.know((x, y), number);
+                            self.register((x, y), number);
                             pixels.push(open((x, y)));
                         }
                     }
@@ -198,10 +207,10 @@ impl Neighborhood {
             let (near, samples) = (self.near(self.at(pixel.at)), pixel.facts.count);
             let is_calm = |seen: Seen| judge.agree(&seen.range) && !judge.differ(own.color, seen.color, samples);
             if samples < GROUPS as u32 && pixel.firefly == 0.0 && near.clone().all(is_calm) {
-                pixel.done(own.error);
+                pixel.converge(own.error);
             } else {
                 pixel.facts.error = own.error;
-                pixel.surround(judge, &self.range(pixel.at));
+                pixel.set_contrast(judge, &self.range(pixel.at));
             }
         }
     }
@@ -228,14 +237,14 @@ mod tests {
             let light = |k: usize| Vec3::splat(step(at) * (k % 2) as f32);
             let each = (0..samples).map(|k| Sample { radiance: light(k), through: Vec3::ZERO });
             pixel.take(&each.collect::<Vec<_>>(), &[], 1);
-            around.know(at, pixels.len());
+            around.register(at, pixels.len());
             pixels.push(pixel);
         }
         (around, pixels)
     }
 
-    fn look(around: &mut Neighborhood, pixels: &mut [Pixel], some: &[usize]) {
-        around.look(&judge(), pixels, some, &mut Vec::new());
+    fn estimate_errors(around: &mut Neighborhood, pixels: &mut [Pixel], some: &[usize]) {
+        around.estimate_errors(&judge(), pixels, some, &mut Vec::new());
     }
 
     /// Standard error of eight samples, four each of 0 and `step`.
@@ -246,7 +255,7 @@ mod tests {
     /// Error of a pixel after all have been evaluated and compared.
     fn told((around, pixels): &mut (Neighborhood, Vec<Pixel>), pixel: usize) -> f32 {
         let all: Vec<usize> = (0..pixels.len()).collect();
-        look(around, pixels, &all);
+        estimate_errors(around, pixels, &all);
         around.compare(&mut pixels[pixel]);
         pixels[pixel].facts.error
     }
@@ -257,7 +266,7 @@ mod tests {
             let mut nine = pixels(TILE, GROUPS, |at| if at == (5, 8) { 0.0 } else { step });
             let told = told(&mut nine, 4);
             assert!((told - error(step)).abs() < 1e-6, "{step}: {told}");
-            assert_eq!(nine.1[4].facts.end == End::Met, certain, "{step}: {told}");
+            assert_eq!(nine.1[4].facts.convergence == Convergence::Converged, certain, "{step}: {told}");
         }
     }
 
@@ -294,16 +303,16 @@ mod tests {
     fn a_pixel_that_was_certain_goes_on_when_those_around_it_turn_out_not_to_be() {
         let judge = judge();
         let (mut around, mut pixels) = pixels(TILE, GROUPS, |_| 0.0);
-        look(&mut around, &mut pixels, &(0..9).collect::<Vec<_>>());
+        estimate_errors(&mut around, &mut pixels, &(0..9).collect::<Vec<_>>());
         let some: Vec<usize> = (0..9).filter(|&i| i != 4).collect();
-        assert!(around.late(&judge, &mut pixels, &some, 16, TILE).is_empty());
+        assert!(around.reopen_uncertain(&judge, &mut pixels, &some, 16, TILE).is_empty());
         for &i in &some {
             pixels[i].join_groups();
             pixels[i].take(&[Sample { radiance: Vec3::ONE, through: Vec3::ZERO }; GROUPS], &[], 2);
-            pixels[i].facts.end = End::Open;
+            pixels[i].facts.convergence = Convergence::Open;
         }
-        look(&mut around, &mut pixels, &some);
-        assert_eq!(around.late(&judge, &mut pixels, &some, 16, TILE), [4]);
-        assert!(pixels[4].facts.end == End::Open);
+        estimate_errors(&mut around, &mut pixels, &some);
+        assert_eq!(around.reopen_uncertain(&judge, &mut pixels, &some, 16, TILE), [4]);
+        assert!(pixels[4].facts.convergence == Convergence::Open);
     }
 }

@@ -1,11 +1,11 @@
 //! A pixel that is sampled until its mean is certain.
 
-use super::places::Wanted;
+use super::sample_batch::SampleRequest;
 use crate::render::certainty::{Certainty, GROUPS, Range};
 use crate::render::fireflies::Fireflies;
 use crate::render::frame::{Sum, pixel_key};
 use crate::render::layers::{FirstSurface, LayerSum};
-use crate::render::tile::{End, PixelFacts};
+use crate::render::tile::{Convergence, PixelFacts};
 use crate::render::whitted::Sample;
 
 /// A pixel in progress.
@@ -38,7 +38,7 @@ impl Pixel {
             key: pixel_key(seed, at),
             groups: Default::default(),
             layers: layers.then(Box::default),
-            facts: PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Open },
+            facts: PixelFacts { count: 0, spare: 0, error: 0.0, convergence: Convergence::Open },
             variance: None,
             contrast: 0.0,
             brightest: 0.0,
@@ -62,31 +62,31 @@ impl Pixel {
     }
 
     /// Prepares for fireflies that were found near the pixel, if rays of some of these samples were spread at random.
-    pub(super) fn expect(&mut self, fireflies: Option<&Fireflies>, by_chance: &[bool]) {
+    pub(super) fn expect_fireflies(&mut self, fireflies: Option<&Fireflies>, by_chance: &[bool]) {
         if let Some(fireflies) = fireflies.filter(|_| by_chance.contains(&true)) {
             (self.firefly, self.missed) = (fireflies.at(self.at), fireflies.missed_at(self.at));
         }
     }
 
     /// Marks the pixel as certain enough, with this standard error.
-    pub(super) fn done(&mut self, error: f32) {
-        (self.facts.error, self.facts.end) = (error, End::Met);
+    pub(super) fn converge(&mut self, error: f32) {
+        (self.facts.error, self.facts.convergence) = (error, Convergence::Converged);
     }
 
     /// Whether the pixel was done with exactly this number of samples.
     pub(super) fn is_done_with(&self, samples: u32) -> bool {
-        self.facts.end == End::Met && self.facts.count == samples
+        self.facts.convergence == Convergence::Converged && self.facts.count == samples
     }
 
     /// Stores the range of its first samples and its neighbours', including fireflies that it may hit.
-    pub(super) fn surround(&mut self, judge: &Certainty, range: &Range) {
+    pub(super) fn set_contrast(&mut self, judge: &Certainty, range: &Range) {
         let range = if self.firefly > 0.0 { range.with(judge.range_of(self.firefly)) } else { *range };
         (self.contrast, self.brightest) = (judge.contrast(&range), range.brightest);
     }
 
     /// The sample of this index.
-    pub(super) fn wanted(&self, index: u32) -> Wanted {
-        Wanted { pixel: self.at, key: self.key, index }
+    pub(super) fn request(&self, index: u32) -> SampleRequest {
+        SampleRequest { pixel: self.at, key: self.key, index }
     }
 
     /// Merges groups in pairs, so that each holds as many samples as the next ones will.
@@ -110,7 +110,7 @@ impl Pixel {
     /// Stores the standard error estimated from its own samples; returns the variance of one of these.
     pub(super) fn learn(&mut self, error: f32) -> f32 {
         let variance = self.variance_of(error);
-        self.take_to_vary(variance);
+        self.set_variance(variance);
         *self.variance.insert(variance)
     }
 
@@ -126,15 +126,15 @@ impl Pixel {
     }
 
     /// Sets the error to that of samples with this variance.
-    pub(super) fn take_to_vary(&mut self, variance: f32) {
+    pub(super) fn set_variance(&mut self, variance: f32) {
         self.facts.error = (variance / self.samples()).sqrt();
     }
 
     /// Marks the pixel as done if its standard error is small enough.
-    pub(super) fn look(&mut self, judge: &Certainty) {
+    pub(super) fn judge(&mut self, judge: &Certainty) {
         let used = self.used(judge);
         if used <= 1.0 {
-            self.facts.end = End::Met;
+            self.facts.convergence = Convergence::Converged;
             self.facts.spare = judge.spare(used, self.facts.count);
         }
     }

@@ -6,7 +6,7 @@
 //! does it: the sum of a sample may depend on those traced with it, where more rays wait than fit into a wave. The samples are
 //! kept until all tiles that need any of them are finished.
 
-use super::first::First;
+use super::first_samples::FirstSamples;
 use super::{Sampler, Stochastic};
 use crate::accel::Accel;
 use crate::render::Progress;
@@ -57,7 +57,7 @@ struct Shared<'t> {
 /// State of the first samples of all zones that belong to a tile.
 struct State {
     step: Step,
-    first: Option<Arc<First>>,
+    first: Option<Arc<FirstSamples>>,
     /// Number of tiles that still need them.
     needing: usize,
 }
@@ -111,11 +111,11 @@ impl<'t> Shared<'t> {
         // Other threads have mostly traced what belongs to tiles before this one.
         for &owner in &self.needs[tile] {
             if let Some(mut promise) = self.promise(owner) {
-                promise.first = Some(sampler.first(tracer, self.zones[owner].iter().copied())?);
+                promise.first = Some(sampler.trace_first(tracer, self.zones[owner].iter().copied())?);
             }
         }
         let first = self.wait_for(tile)?;
-        let first: Vec<&First> = first.iter().map(|first| &**first).collect();
+        let first: Vec<&FirstSamples> = first.iter().map(|first| &**first).collect();
         let done = sampler.finish(tracer, self.tiles[tile], &first)?;
         self.forget(tile);
         Some(done)
@@ -137,7 +137,7 @@ impl<'t> Shared<'t> {
 
     /// Waits for the first samples that a tile needs; `None` when some failed. All must be promised, and no thread may wait while
     /// it holds a promise.
-    fn wait_for(&self, tile: usize) -> Option<Vec<Arc<First>>> {
+    fn wait_for(&self, tile: usize) -> Option<Vec<Arc<FirstSamples>>> {
         let (mut states, needs) = (self.states(), &self.needs[tile]);
         while needs.iter().any(|&owner| states[owner].step != Step::Done) {
             states = self.changed.wait(states).unwrap_or_else(PoisonError::into_inner);
@@ -172,7 +172,7 @@ struct Promise<'a, 't> {
     shared: &'a Shared<'t>,
     owner: usize,
     /// Samples of all zones; `None` after a failure.
-    first: Option<First>,
+    first: Option<FirstSamples>,
 }
 
 impl Drop for Promise<'_, '_> {

@@ -13,7 +13,7 @@ use crate::render::whitted::Tracer;
 
 /// One sample of a pixel.
 #[derive(Clone, Copy)]
-pub(in crate::render) struct Wanted {
+pub(in crate::render) struct SampleRequest {
     /// Column and row.
     pub pixel: (u32, u32),
     /// Key of the pixel's random sequence.
@@ -24,7 +24,7 @@ pub(in crate::render) struct Wanted {
 
 /// Samples that are traced together, as columns.
 #[derive(Default)]
-pub(in crate::render) struct Places {
+pub(in crate::render) struct SampleBatch {
     keys: Vec<u32>,
     indices: Vec<u32>,
     /// Position from the upper left corner of the picture: of the pixel, then of the sample.
@@ -32,7 +32,7 @@ pub(in crate::render) struct Places {
     y: Vec<f64>,
 }
 
-impl Places {
+impl SampleBatch {
     /// Traces all these samples together; `None` when cancelled.
     pub(in crate::render) fn trace<A: Accel, P: Observer>(
         &mut self,
@@ -40,12 +40,12 @@ impl Places {
         how: &Stochastic,
         tracer: &mut Tracer<A, P>,
         roulette: Roulette,
-        wanted: impl Iterator<Item = Wanted>,
+        wanted: impl Iterator<Item = SampleRequest>,
     ) -> Option<()> {
         self.clear();
         let Self { keys, indices, x, y } = self;
         // Nested iterators are fast with internal iteration, and slow with `next`.
-        wanted.for_each(|Wanted { pixel, key, index }| {
+        wanted.for_each(|SampleRequest { pixel, key, index }| {
             keys.push(key);
             indices.push(index);
             x.push(f64::from(pixel.0));

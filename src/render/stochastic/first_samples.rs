@@ -3,7 +3,7 @@
 use super::Sampler;
 use super::neighborhood::Neighborhood;
 use super::pixel::Pixel;
-use super::places::Places;
+use super::sample_batch::SampleBatch;
 use crate::accel::Accel;
 use crate::render::ahead::OfPixel;
 use crate::render::certainty::{Pixels, Shown};
@@ -15,7 +15,7 @@ use crate::render::tile::{BLOCK, TOGETHER, Tile, TilePixels};
 use crate::render::whitted::{Sample, Tracer};
 
 /// One sample of every pixel of some parts of the picture: part after part, each in the order of its places.
-pub(super) struct First {
+pub(super) struct FirstSamples {
     /// The parts, each with the index of its first pixel.
     parts: Vec<(Tile, usize)>,
     samples: Vec<Sample>,
@@ -30,11 +30,11 @@ pub(super) struct First {
 
 impl Sampler<'_> {
     /// Traces the first sample of every pixel of these tiles, all together; `None` when cancelled.
-    pub(super) fn first<A: Accel, P: Observer>(
+    pub(super) fn trace_first<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
         tiles: impl Iterator<Item = Tile> + Clone,
-    ) -> Option<First> {
+    ) -> Option<FirstSamples> {
         let count = tiles.clone().map(Tile::pixels).sum();
         let (mut columns, mut rows) = (Vec::with_capacity(count), Vec::with_capacity(count));
         let mut parts = Vec::new();
@@ -43,7 +43,7 @@ impl Sampler<'_> {
             tile.list((&mut columns, &mut rows));
         }
         let (mut samples, mut by_chance, mut firsts) = (Vec::with_capacity(count), Vec::new(), Vec::new());
-        let mut places = Places::default();
+        let mut batch = SampleBatch::default();
         if let Some(ahead) = self.ahead {
             for at in columns.iter().copied().zip(rows.iter().copied()) {
                 let OfPixel { samples: own, by_chance: spread, firsts: surfaces } = ahead.of(at, 0..1);
@@ -53,18 +53,18 @@ impl Sampler<'_> {
             }
         } else {
             for (columns, rows) in columns.chunks(TOGETHER).zip(rows.chunks(TOGETHER)) {
-                places.trace_each(self.frame, self.how, tracer, 0, columns, rows)?;
+                batch.trace_each(self.frame, self.how, tracer, 0, columns, rows)?;
                 samples.extend_from_slice(&tracer.samples);
                 by_chance.extend_from_slice(&tracer.by_chance);
                 firsts.extend_from_slice(&tracer.firsts);
             }
         }
         let (shown, pixels) = self.judge.see_samples(&samples);
-        Some(First { parts, samples, by_chance, firsts, pixels, shown })
+        Some(FirstSamples { parts, samples, by_chance, firsts, pixels, shown })
     }
 }
 
-impl First {
+impl FirstSamples {
     /// Passes to `tell` the pixels of a tile, as far as they are among these, whose rays were spread at random.
     pub(super) fn each_by_chance(&self, tile: Tile, mut tell: impl FnMut((u32, u32))) {
         let parts = self.parts.iter().filter(|(part, _)| !self.by_chance.is_empty() && part.meets(tile));
@@ -78,7 +78,7 @@ impl First {
     pub(super) fn give(&self, pixel: &mut Pixel, fireflies: Option<&Fireflies>) {
         let Some(&(part, start)) = self.parts.iter().find(|(part, _)| part.contains(pixel.at)) else { return };
         let own = start + part.number(pixel.at);
-        pixel.expect(fireflies, self.by_chance.get(own..=own).unwrap_or_default());
+        pixel.expect_fireflies(fireflies, self.by_chance.get(own..=own).unwrap_or_default());
         pixel.take(&self.samples[own..=own], self.firsts.get(own..=own).unwrap_or_default(), 1);
     }
 
