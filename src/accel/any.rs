@@ -1,4 +1,4 @@
-//! The choice of a structure and a test: the enums meet the user, the traits meet the ray.
+//! Choice of the structure and the ray/triangle test at run time: enums for the user, static dispatch for the rays.
 
 use std::any::Any;
 
@@ -12,30 +12,30 @@ use super::{
 use crate::math::aabb::Aabb;
 use crate::named::names;
 
-/// Which structure culls.
+/// Culling structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AccelKind {
-    /// Every ray against every shape.
+    /// No culling: every ray is tested against every shape.
     None,
-    /// The scene turned for each ray, and sorted by depth.
+    /// Shapes transformed into each ray's frame and sorted by depth.
     Transform,
-    /// A sphere around each object.
+    /// A bounding sphere around each object.
     Spheres,
-    /// A box around each object.
+    /// A bounding box around each object.
     Boxes,
-    /// A binary hierarchy of boxes.
+    /// A binary bounding volume hierarchy.
     Bvh,
     /// A uniform grid with a mailbox.
     Grid,
-    /// A uniform grid, its crowded cells refined by octrees, with a mailbox.
+    /// A uniform grid with octrees in its crowded cells, with a mailbox.
     GridOctree,
-    /// A uniform grid, a hierarchy of boxes in each crowded cell, with a mailbox.
+    /// A uniform grid with a hierarchy of boxes in each crowded cell, with a mailbox.
     GridBvh,
     /// One cell refined by an octree, with a mailbox.
     Octree,
-    /// Boxes in nodes of eight, cut by the planes of an octree; small cells are cut by surface area.
+    /// An 8-wide hierarchy of boxes, split by octree planes; small cells are split by surface area.
     FastOctree,
-    /// Boxes in nodes of eight, cut by surface area.
+    /// An 8-wide hierarchy of boxes, split by surface area.
     FastBvh,
 }
 
@@ -61,45 +61,45 @@ impl Default for AccelKind {
 }
 
 impl AccelKind {
-    /// The default of the fast ones. What the command line uses when none is named is
-    /// [`AccelChoice::Auto`](super::AccelChoice::Auto), which looks at the shapes.
+    /// Default of the fast structures. The command line's own default is [`AccelChoice::Auto`](super::AccelChoice::Auto),
+    /// which looks at the shapes.
     pub const DEFAULT: Self = Self::FastOctree;
 
-    /// Whether it has a grid whose cells can be chosen.
+    /// Whether the structure has a grid whose resolution can be chosen.
     pub const fn has_grid(self) -> bool {
         matches!(self, Self::Grid | Self::GridOctree | Self::GridBvh)
     }
 
-    /// Whether it has octrees.
+    /// Whether the structure has octrees.
     pub const fn has_octrees(self) -> bool {
         matches!(self, Self::GridOctree | Self::Octree)
     }
 
-    /// Whether it has leaves whose size can be chosen.
+    /// Whether the structure has leaves whose size can be chosen.
     pub const fn has_leaves(self) -> bool {
         matches!(self, Self::Bvh | Self::GridBvh | Self::GridOctree | Self::Octree)
     }
 
-    /// Whether it has cells that list shapes, so that a ray may meet one in several.
+    /// Whether the structure has cells that list shapes, so that a ray may meet a shape in several cells.
     pub const fn has_cells(self) -> bool {
         matches!(self, Self::Grid | Self::GridOctree | Self::GridBvh | Self::Octree)
     }
 
-    /// Whether it can hold objects that are stored once and stand in several places.
+    /// Whether the structure can hold instanced objects, stored once and placed several times.
     pub fn keeps_instances(self) -> bool {
         matches!(self, Self::FastOctree | Self::FastBvh)
     }
 
-    /// Whether a ray may be tested against a large part of the prims: where many rays are asked, such a structure gets
+    /// Whether a ray may be tested against a large part of the prims. Measurements over many rays give such a structure only
     /// a sample of them.
     pub fn is_slow(self) -> bool {
         matches!(self, Self::None | Self::Transform | Self::Spheres | Self::Boxes)
     }
 }
 
-/// A built structure of any kind, and the test that it is asked with.
+/// A built structure of any kind, with the ray/triangle test that its queries use.
 ///
-/// The choice is looked up once for each slice of rays, and everything behind it is compiled for it.
+/// The choice is dispatched once per slice of rays; all code behind it is compiled for that choice.
 #[derive(Clone, Debug)]
 pub struct AnyAccel<'a> {
     kind: AccelKind,
@@ -119,7 +119,7 @@ enum Structure<'a> {
     TwoLevel(TwoLevel<'a>),
 }
 
-/// Evaluates an expression for whatever structure there is.
+/// Evaluates an expression for whichever structure the enum holds.
 macro_rules! whichever {
     ($structure:expr, $a:ident => $value:expr) => {
         match $structure {
@@ -135,25 +135,25 @@ macro_rules! whichever {
     };
 }
 
-/// What a walk through [`AnyAccel`] writes to.
+/// Scratch memory of walks through [`AnyAccel`].
 #[derive(Debug)]
 pub struct AnyScratch(Box<dyn Any + Send>);
 
-/// A question that can be asked of any structure.
+/// A query that any structure can answer.
 trait Question {
-    /// Whether the probe records nothing of how it is answered.
+    /// Whether the probe records nothing of the walk.
     const SILENT: bool;
 
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch);
 }
 
 impl<'a> AnyAccel<'a> {
-    /// Builds a structure over `shapes`, asked with the exact test. A [`World`](crate::render::World) may keep more than its
+    /// Builds a structure over `shapes`, with the exact test. A [`World`](crate::render::World) may hold more than its
     /// shapes: [`World::structure`](crate::render::World::structure) builds over everything.
     ///
     /// # Panics
     ///
-    /// It may, with parameters that [`AccelParams::validate`] refuses, and where a vertex is infinite.
+    /// May panic with parameters that [`AccelParams::validate`] refuses, or where a vertex is infinite.
     pub fn build(kind: AccelKind, shapes: &'a Shapes, params: &AccelParams) -> Self {
         let structure = match kind {
             AccelKind::None => Structure::None(Unculled::new(shapes)),
@@ -174,8 +174,8 @@ impl<'a> AnyAccel<'a> {
         Self { kind, structure, test: IntersectorKind::Exact }
     }
 
-    /// Builds a structure over `shapes` and what is `instanced`, where anything is; for kinds that can
-    /// ([`AccelKind::keeps_instances`]), others give way to the default. Asked with the exact test, and with no other where
+    /// Builds a structure over `shapes` and the `instanced` objects, if any. Kinds that cannot hold instances
+    /// ([`AccelKind::keeps_instances`]) give way to the default. Uses the exact test, which is the only one allowed where
     /// anything is instanced.
     pub fn build_with(
         kind: AccelKind,
@@ -194,35 +194,35 @@ impl<'a> AnyAccel<'a> {
         Self { kind, structure, test: IntersectorKind::Exact }
     }
 
-    /// This structure, asked with another ray/triangle test.
+    /// Returns this structure with another ray/triangle test.
     #[must_use]
     pub fn tested_by(self, test: IntersectorKind) -> Self {
         Self { test, ..self }
     }
 
-    /// What it culls.
+    /// Shapes that the structure culls.
     pub fn shapes(&self) -> &Shapes {
         whichever!(&self.structure, a => a.shapes())
     }
 
-    /// Which kind it is.
+    /// Kind of the structure.
     pub fn kind(&self) -> AccelKind {
         self.kind
     }
 
-    /// What it is made of.
+    /// Sizes of the structure.
     pub fn summary(&self) -> StructureStats {
         whichever!(&self.structure, a => a.summary())
     }
 
-    /// Visits everything and proves that no hit can be lost; the error says which prim and cell disagree, and how.
+    /// Visits everything and proves that no hit can be lost; the error names the prim and the cell that disagree, and how.
     pub fn check(&self) -> Result<StructureStats, String> {
         whichever!(&self.structure, a => a.check())
     }
 
     fn ask<Q: Question>(&self, question: Q, scratch: &mut AnyScratch) {
         match &self.structure {
-            // What is timed has code of its own for every test.
+            // Timed (silent) walks have code of their own for every test.
             Structure::Wide(a) if Q::SILENT => with_scratch(a, scratch, |scratch| match self.test {
                 IntersectorKind::Exact => question.ask(a, scratch),
                 IntersectorKind::Watertight => question.ask(&Tested::new(a, Watertight), scratch),
@@ -242,7 +242,7 @@ impl<'a> AnyAccel<'a> {
     }
 }
 
-/// Asks a structure with a test that is looked up each time, unless it is the exact one.
+/// Runs a query with the test looked up at each use, unless it is the exact one.
 fn looked<C: Culling<Scratch: 'static>>(
     accel: &C,
     test: IntersectorKind,
@@ -255,7 +255,7 @@ fn looked<C: Culling<Scratch: 'static>>(
     });
 }
 
-/// Calls `f` with the structure's own scratch; a fresh one if that of another was given.
+/// Calls `f` with `scratch` if it belongs to this structure, else with a fresh one.
 fn with_scratch<A: Accel<Scratch: 'static>>(accel: &A, scratch: &mut AnyScratch, f: impl FnOnce(&mut A::Scratch)) {
     match scratch.0.downcast_mut() {
         Some(scratch) => f(scratch),
@@ -271,7 +271,7 @@ impl Accel for AnyAccel<'_> {
         AnyScratch(whichever!(&self.structure, a => Box::new(a.scratch())))
     }
 
-    // All that are silent share what is compiled for one.
+    // All silent probes share the code compiled for `NoProbe`.
 
     fn first_hits<P: Probe>(&self, queries: &HitQueries, hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
         let after = queries.after.map_or(hits.len(), <[Hit]>::len);

@@ -1,22 +1,22 @@
-//! `auto`: the fast structure that a fixed sample of rays finds cheaper.
+//! `auto`: whichever fast structure costs less for a fixed sample of rays.
 //!
-//! After M. Hapala, O. Karlík, V. Havran, *When It Makes Sense to Use Uniform Grids for Ray Tracing*, 2011: both
-//! structures are built, some rays are traced through each, and what they cost decides. Here the cost is counted, never
-//! timed, so that the choice depends on neither the machine nor the number of threads; and a scene is judged by a part of
-//! its prims, so that it costs little.
+//! After M. Hapala, O. Karlík, V. Havran, *When It Makes Sense to Use Uniform Grids for Ray Tracing*, 2011: both structures
+//! are built, some rays are traced through each, and the cheaper one wins. Here the cost is counted, never timed, so that the
+//! choice depends on neither the machine nor the number of threads; and only a sample of the prims is judged, to keep the
+//! choice cheap.
 //!
-//! The rays leave the surface as evenly as light does, by its area: what such a ray starts in it must visit, and where large
-//! faces make boxes overlap that tells the structures apart as nothing else does (after T. Aila, T. Karras, S. Laine, *On
-//! Quality Metrics of Bounding Volume Hierarchies*, 2013). A ray from the eye is one of them, too, backwards. Faces that are
-//! larger than a ray's share of the surface are always among those that are judged, and rays from these whose start is
-//! rounded to their other side hit them at once: they count what they start in alone, without the way through a scene of
-//! which most is left out.
+//! Ray origins are distributed over the surface by area, as light would be. A ray must visit the nodes that contain its
+//! origin, and where large faces make boxes overlap, their number separates the structures better than any other measure
+//! (after T. Aila, T. Karras, S. Laine, *On Quality Metrics of Bounding Volume Hierarchies*, 2013). A reversed eye ray is one
+//! of these rays, too. Faces larger than one ray's share of the surface are always in the sample. A ray that starts on such a
+//! face, with its origin rounded to the other side, hits that face at once: it counts only the nodes around its origin, not a
+//! way through a scene of which most is left out.
 //!
-//! Both are built equally fast, and mostly cost nearly the same; where fine detail stands in a wide scene the octree may cost
-//! much less. So the hierarchy must save more than a sample may show by chance, and a little more, as a part of a scene favours
-//! it: of five large samples each of two meshes that both serve alike none showed a twentieth. Few shapes are cut alike by
-//! both, and scenes that are not large take no sample: one in proportion would tell nothing, and a larger one takes longer
-//! than what it may save. So it does in pictures with few pixels.
+//! Both structures build equally fast and mostly cost nearly the same; where fine detail stands in a wide scene the octree
+//! may cost much less. So the hierarchy must save more than a sample may show by chance, and a little more, because sampling
+//! prims favours it: of five large samples each of two meshes for which both structures do equally well, none differed by a
+//! twentieth. Few shapes are split alike by both, and small scenes take no sample: a proportional one would show nothing, and
+//! a larger one takes longer than it could save. The same holds for pictures with few pixels.
 
 use std::fmt;
 use std::str::FromStr;
@@ -33,51 +33,51 @@ use crate::math::triangle;
 use crate::named::{Named, UnknownName};
 use rayon::prelude::*;
 
-/// One prim of so many is judged: finding out must cost less than it can save.
+/// One prim in this many is sampled: the choice must cost less than it can save.
 const SHARE: u32 = 32;
-/// Where that were fewer than these, the octree is taken.
+/// Smallest sample, in prims; below it the octree is taken.
 const FEWEST: u32 = 1 << 10;
-/// No more than these are judged.
+/// Largest sample, in prims.
 const MOST: u32 = 1 << 13;
 
-/// They are taken in runs of so many neighbours: longer ones leave out more of the scene.
+/// Length of the runs of neighbouring prims in a sample: longer runs leave out more of the scene.
 const RUN: u32 = 4;
 
-/// About so many are judged at a time: a tree over few is cut this way or that by chance, and the mean of several tells more
-/// than one over all.
+/// Prims of one part of the sample, roughly. Splits of a tree over few prims depend on chance: the mean of several trees
+/// tells more than one tree over all.
 const PART: u32 = 1 << 11;
 
-/// Rays of the sample.
+/// Number of rays in the sample.
 const RAYS: usize = 1 << 10;
 
-/// Prims whose areas are summed at a time.
+/// Prims per partial sum of areas.
 const CHUNK: u32 = 1 << 12;
 
-/// The part of the octree's cost that the hierarchy must save.
+/// Share of the octree's cost that the hierarchy must save.
 const WORTH: f64 = 1.0 / 20.0;
 
-/// Eye rays of a picture for each prim that is judged, at least: judging one takes as long as tracing a dozen eye rays and what
-/// comes of them, of which the better structure saves a part.
+/// Fewest eye rays of a picture per sampled prim: judging one prim takes as long as tracing a dozen eye rays and their
+/// secondary rays, and the better structure saves only a part of that.
 const RAYS_A_PRIM: u64 = 64;
 
-/// What a block of eight triangles costs, in nodes of eight boxes.
+/// Cost of a block of eight triangles, in nodes of eight boxes.
 const BLOCK: f64 = 1.5;
 
-/// What the command is told: a kind, or to find out.
+/// Structure asked for: a given kind, or an automatic choice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum AccelChoice {
-    /// The better one of the fast structures.
+    /// The cheaper of the fast structures.
     #[default]
     Auto,
-    /// This one.
+    /// The given kind.
     Kind(AccelKind),
 }
 
 impl AccelChoice {
-    /// As typed.
+    /// Name of [`Self::Auto`] on the command line.
     pub const AUTO: &'static str = "auto";
 
-    /// As typed and printed.
+    /// Name on the command line and in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Auto => Self::AUTO,
@@ -85,7 +85,7 @@ impl AccelChoice {
         }
     }
 
-    /// The structures that may be built.
+    /// Structures that may be built.
     pub const fn kinds(&self) -> &[AccelKind] {
         match self {
             Self::Auto => &[AccelKind::FastOctree, AccelKind::FastBvh],
@@ -116,45 +116,45 @@ impl Named for AccelChoice {
     }
 }
 
-/// What was chosen, and why.
+/// Chosen structure, and the reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reason {
-    /// What was chosen.
+    /// Chosen kind.
     pub kind: AccelKind,
-    /// Triangles and other prims that were judged: those of a sample, else all.
+    /// Number of prims judged: those of a sample, else all.
     pub prims: usize,
-    /// What it was chosen by.
+    /// Ground of the choice.
     pub why: Why,
 }
 
-/// What a structure is chosen by.
+/// Ground on which a structure is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Why {
-    /// Both structures are the same tree.
+    /// Both structures would be the same tree.
     OneTree,
     /// There are too few prims for a sample.
     FewPrims,
-    /// So many eye rays are too few for one.
+    /// Too few eye rays, this many, for a sample.
     FewRays(u64),
-    /// There is no surface from which rays of a sample could start.
+    /// No surface from which sample rays could start.
     NoSurface,
-    /// A sample.
+    /// The cost of sample rays.
     Sample(Sample),
 }
 
-/// What rays of a sample cost.
+/// Cost of the sample rays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// How many there were.
+    /// Number of rays.
     pub rays: usize,
-    /// Cost of one through `fast-octree`, in nodes.
+    /// Mean cost of a ray through `fast-octree`, in nodes.
     pub octree: f64,
-    /// Cost of one through `fast-bvh`, in nodes.
+    /// Mean cost of a ray through `fast-bvh`, in nodes.
     pub bvh: f64,
 }
 
 impl Reason {
-    /// What rays of a sample cost, where there was one.
+    /// Cost of the sample rays, if a sample was taken.
     pub fn sample(&self) -> Option<Sample> {
         if let Why::Sample(sample) = self.why { Some(sample) } else { None }
     }
@@ -185,8 +185,8 @@ impl fmt::Display for Reason {
     }
 }
 
-/// Builds what was asked for, for however many rays; the reason, where there was a choice. The same for every number of
-/// threads.
+/// Builds the chosen structure, for any number of rays; also returns the reason if there was a choice. The result does not
+/// depend on the number of threads.
 pub fn build<'a>(choice: AccelChoice, shapes: &'a Shapes, params: &AccelParams) -> (AnyAccel<'a>, Option<Reason>) {
     build_for(u64::MAX, choice, shapes, params)
 }
@@ -204,8 +204,8 @@ fn build_for<'a>(
     (AnyAccel::build(reason.kind, shapes, params), Some(reason))
 }
 
-/// Builds a structure as [`build`] does over `shapes` and `instanced` objects, for so many primary rays: the larger of both,
-/// shapes or objects, is the one that is judged.
+/// Builds a structure like [`build`] over `shapes` and `instanced` objects, for the given number of eye rays. The largest set
+/// of prims, `shapes` or one object, is the one that is judged.
 pub fn build_with<'a>(
     eye_rays: u64,
     choice: AccelChoice,
@@ -225,14 +225,14 @@ pub fn build_with<'a>(
     (AnyAccel::build_with(kind, shapes, instanced, params), reason)
 }
 
-/// What [`build_with`] would choose, and why, by the largest of what it builds trees over.
+/// Choice of [`build_with`], and its reason, judged by the largest set of prims over which a tree is built.
 pub fn reason(shapes: &Shapes, instanced: &InstancedObjects, eye_rays: u64) -> Reason {
     let objects = instanced.objects().iter().map(Object::shapes);
     let largest = objects.fold(shapes, |a, b| if b.bounded() >= a.bounded() { b } else { a });
     judge(largest, eye_rays)
 }
 
-/// Judges a scene by a part of it, where it is large and so many eye rays pay for that.
+/// Judges a scene by a sample of its prims, if it is large and the number of eye rays is worth it.
 fn judge(shapes: &Shapes, eye_rays: u64) -> Reason {
     let bounded = shapes.bounded();
     let judged = (bounded / SHARE).min(MOST);
@@ -249,7 +249,7 @@ fn judge(shapes: &Shapes, eye_rays: u64) -> Reason {
     }
     let rays = sample(shapes, &starts);
     let count = (judged / PART).max(1);
-    // Each part is asked by some of the rays, from all over the surface.
+    // Each part is traced with its share of the rays, from all over the surface.
     let of_part = |k: u32| {
         let part = part(shapes, judged / count, u64::from(k), &starts);
         let rays: Vec<Ray> = rays.iter().skip(k as usize).step_by(count as usize).copied().collect();
@@ -264,28 +264,28 @@ fn judge(shapes: &Shapes, eye_rays: u64) -> Reason {
     Reason { kind, prims, why: Why::Sample(Sample { rays: rays.len(), octree, bvh }) }
 }
 
-/// Of one ray, in nodes.
+/// Mean cost of a ray, in nodes.
 fn cost(accel: &Wide, rays: &[Ray]) -> f64 {
     let mut counts = RayCounts::default();
     accel.closest(rays, &mut vec![Hit::MISS; rays.len()], &mut accel.scratch(), &mut counts);
     nodes(&counts)
 }
 
-/// The cost of an average ray by which the choice is made, in nodes.
+/// Mean cost of a ray in nodes, the measure of the choice.
 pub fn nodes(counts: &RayCounts) -> f64 {
     let blocks = counts.n_ets as f64;
     (counts.n_ts as f64 - blocks + blocks * BLOCK) / counts.queries.max(1) as f64
 }
 
-/// About so many prims, at most, in runs of neighbours spread over all, each time others; and of `starts` those that are there
-/// more than once.
+/// Samples at most about `judged` prims, in runs of neighbours spread over all of them, different ones for each `time`; prims
+/// that occur more than once in `starts` are always included.
 fn part(shapes: &Shapes, judged: u32, time: u64, starts: &[u32]) -> Shapes {
     let bounded = shapes.bounded();
     let stride = bounded.div_ceil(judged / RUN);
     let (mut part, mut random) = (Shapes::default(), Random::new(time));
     let mut large = starts.chunk_by(|a, b| a == b).filter(|same| same.len() > 1).map(|same| same[0]).peekable();
     for start in (0..bounded).step_by(stride as usize) {
-        // Anywhere: files repeat things, and even steps would meet the same part of each.
+        // At random: files repeat patterns, and even steps would always hit the same part of them.
         let room = stride.saturating_sub(RUN) as usize + 1;
         let first = start.saturating_add(u32::try_from(random.below(room)).unwrap_or(0));
         let run = first..bounded.min(first.saturating_add(RUN));
@@ -321,7 +321,7 @@ fn copy(shapes: &Shapes, prim: u32, part: &mut Shapes) {
     }
 }
 
-/// Twice the area of a triangle, or half the surface of another prim's box; 0 where that is no number.
+/// Twice the area of a triangle, or half the surface of another prim's box; 0 if that is not finite.
 fn area(shapes: &Shapes, prim: u32) -> f32 {
     let area = match shapes.triangles.get(prim as usize) {
         Some(&corners) => {
@@ -336,7 +336,7 @@ fn area(shapes: &Shapes, prim: u32) -> f32 {
     if area.is_finite() { area } else { 0.0 }
 }
 
-/// So many prims at even steps of the surface, in order: one that is larger than a step comes several times.
+/// Picks `count` prims at even steps of surface area, in order: a prim larger than a step occurs several times.
 fn over_surface(shapes: &Shapes, count: usize) -> Vec<u32> {
     let bounded = shapes.bounded();
     let chunk = |i: u32| i * CHUNK..bounded.min((i + 1).saturating_mul(CHUNK));
@@ -358,7 +358,7 @@ fn over_surface(shapes: &Shapes, count: usize) -> Vec<u32> {
         chunks.push((i, areas, before, before + sum));
         before += sum;
     }
-    // The places are half a step from whole ones.
+    // Samples lie half a step off whole steps.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to count")]
     let first = |area: f64| ((area / step + 0.5) as usize).min(count);
     let found = |(i, areas, before, end): (u32, Vec<f32>, f64, f64)| {
@@ -379,7 +379,7 @@ fn over_surface(shapes: &Shapes, count: usize) -> Vec<u32> {
     chunks.into_par_iter().flat_map_iter(found).collect()
 }
 
-/// A ray from somewhere on each of these prims in any direction.
+/// Rays in random directions from random points on the given prims.
 fn sample(shapes: &Shapes, starts: &[u32]) -> Vec<Ray> {
     let mut random = Random::new(0);
     let mut ray = |&prim: &u32| {
@@ -389,7 +389,7 @@ fn sample(shapes: &Shapes, starts: &[u32]) -> Vec<Ray> {
     starts.iter().map(&mut ray).collect()
 }
 
-/// Somewhere on a triangle, or in the box of another prim.
+/// Random point on a triangle, or in the box of another prim.
 fn place(shapes: &Shapes, prim: u32, random: &mut Random) -> Vec3 {
     match shapes.triangles.get(prim as usize) {
         Some(&corners) => triangle::within(&shapes.corners(corners), random.unit(), random.unit()),
@@ -412,7 +412,7 @@ mod tests {
         reason
     }
 
-    /// Three clumps along each axis, so that middle planes cut through them; each of so many triangles.
+    /// Three clumps along each axis, so that middle planes cut through them, with `each` triangles per clump.
     fn clumps(each: u32) -> Shapes {
         let mut random = Random::new(5);
         let mut vertices = Vec::new();
@@ -444,7 +444,7 @@ mod tests {
             assert_eq!(reason.kind, better, "{name}: {reason}");
             match name {
                 "clumps" => assert_eq!(reason.kind, AccelKind::FastBvh, "{reason}"),
-                // Nothing parts copies: both are the same tree.
+                // No plane separates copies: both are the same tree.
                 "copies" => assert_eq!(octree, bvh, "{reason}"),
                 _ => {}
             }
@@ -500,7 +500,7 @@ mod tests {
     fn rays_start_from_large_faces_as_often_as_these_are_large() {
         let mut random = Random::new(9);
         let mut corners: Vec<Vec3> = (0..3 * 9000).map(|_| random.cube() * 0.5).collect();
-        // As large as all others together.
+        // A triangle as large as all others together.
         let areas: f32 = corners.chunks(3).map(|t| (t[1] - t[0]).cross(t[2] - t[0]).length()).sum();
         corners.extend([Vec3::ZERO, Vec3::X * areas, Vec3::Y]);
         let shapes = scenes::mesh(corners, (0..9001).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect());

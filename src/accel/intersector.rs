@@ -1,7 +1,7 @@
-//! Which ray/triangle test decides: the exact one, or one of those it is compared with.
+//! Ray/triangle tests: the exact one, and the others it is compared with.
 //!
-//! Only the exact test gives the same hits with every structure; the others are there so that their speed and error can
-//! be measured on a user's own mesh.
+//! Only the exact test gives the same hits with every structure; the others exist so that their speed and error can be
+//! measured on a user's own mesh.
 
 use std::fmt;
 
@@ -13,20 +13,20 @@ use crate::named::names;
 
 /// A ray/triangle test.
 pub trait Intersector: Copy + Send + Sync {
-    /// Whether its verdicts and distances are those of exact arithmetic, so that a filter may decide for it.
+    /// Whether verdicts and distances are those of exact arithmetic, so that a filter may decide in place of the test.
     const EXACT: bool = false;
 
-    /// What the tests of one ray share.
+    /// Data shared by all tests of one ray.
     type Prepared: Copy + fmt::Debug;
 
-    /// Prepares a ray.
+    /// Computes the shared data of a ray.
     fn prepare(self, ray: &RaySpace) -> Self::Prepared;
 
-    /// The distance at which the line through the ray meets the triangle, if it does.
+    /// Distance at which the line through the ray hits the triangle, if it does.
     fn distance(prepared: &Self::Prepared, ray: &RaySpace, triangle: &Triangle) -> Option<f32>;
 }
 
-/// Exact verdicts, distances rounded once.
+/// Exact test: exact verdicts, distances rounded once.
 #[derive(Clone, Copy, Debug)]
 pub struct Exact;
 
@@ -111,18 +111,18 @@ impl Intersector for MollerTrumboreDouble {
     }
 }
 
-/// Any of them, looked up at every test: where code for each would be too much of it.
+/// Any of these tests, dispatched at each call: used where compiling code for each would cost too much.
 #[derive(Clone, Copy, Debug)]
 pub struct Looked(pub IntersectorKind);
 
-/// What [`Looked`] prepares.
+/// Prepared data of [`Looked`].
 #[derive(Clone, Copy, Debug)]
 pub enum Prepared {
-    /// Nothing, for a test that needs nothing.
+    /// No data, for a test that needs none.
     Plain(IntersectorKind),
-    /// For [`Watertight`].
+    /// Data of [`Watertight`].
     Single(Shear<f32>),
-    /// For [`WatertightDouble`].
+    /// Data of [`WatertightDouble`].
     Double(Shear<f64>),
 }
 
@@ -157,7 +157,7 @@ fn narrow(t: f64) -> f32 {
     t as f32
 }
 
-/// The choice of an [`Intersector`].
+/// Choice of the [`Intersector`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum IntersectorKind {
     /// [`Exact`].

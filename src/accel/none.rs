@@ -1,26 +1,26 @@
-//! No culling: every ray against every shape. The specification of every other structure.
+//! No culling: every ray is tested against every shape. The specification of every other structure.
 
 use super::query::{Culling, Goal, Query};
 use super::{Probe, Shapes, StructureStats};
 
-/// Tests everything.
+/// Structure that tests every prim.
 #[derive(Clone, Copy, Debug)]
 pub struct Unculled<'a> {
     shapes: &'a Shapes,
 }
 
 impl<'a> Unculled<'a> {
-    /// Nothing to build.
+    /// Creates the structure; there is nothing to build.
     pub fn new(shapes: &'a Shapes) -> Self {
         Self { shapes }
     }
 
-    /// All zero but the references: every prim is listed once.
+    /// Sizes: all zero but the references, because every prim is listed once.
     pub fn summary(&self) -> StructureStats {
         StructureStats::listing(self.shapes.bounded())
     }
 
-    /// Nothing is built that could lose a hit.
+    /// Always succeeds: nothing is built that could lose a hit.
     pub fn check(&self) -> Result<StructureStats, String> {
         Ok(self.summary())
     }

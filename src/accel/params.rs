@@ -1,38 +1,39 @@
-//! What a user may ask of a structure; what is left open follows from its kind.
+//! Parameters a user may set for a structure; those left open follow from its kind.
 
 use super::grid::mailbox::MailboxKind;
 use super::grid::params::{Assign, GridParams, ParamError, check};
 use super::{AccelKind, bvh};
 
-/// Parameters of all structures; each looks at those that it has. `None`: what suits the kind.
+/// Parameters of all structures; each kind reads its own. `None`: the default of the kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AccelParams {
     /// Cells of the top grid per prim, more than 0 and at most 64. For kinds with a grid.
     pub density: Option<f64>,
-    /// Most cells along one axis of the top grid, 1 to 1024. For kinds with a grid.
+    /// Largest number of cells along one axis of the top grid, 1 to 1024. For kinds with a grid.
     pub max_resolution: Option<u32>,
-    /// Most levels of an octree below a top cell, 0 to 10. For `grid-octree` and `octree`.
+    /// Largest number of octree levels below a top cell, 0 to 10. For `grid-octree` and `octree`.
     pub max_depth: Option<u32>,
-    /// Cost of visiting a cell in prim tests, 0.1 to 100: a cell is split when that is expected to pay. For `grid-octree`
+    /// Cost of visiting a cell, in prim tests, 0.1 to 100: a cell is split when that is expected to pay. For `grid-octree`
     /// and `octree`.
     pub step_cost: Option<f64>,
-    /// Prims that a leaf may hold, 1 to 1000. For `bvh` and `grid-bvh`; for `grid-octree` and `octree` instead of the step
-    /// cost: every cell that lists more is split, as deep as may be.
+    /// Largest number of prims in a leaf, 1 to 1000. For `bvh` and `grid-bvh`; for `grid-octree` and `octree` it replaces the
+    /// step cost: every cell that lists more is split, as deep as allowed.
     pub leaf_size: Option<u32>,
     /// Cells of the top grid on each axis, 1 to 1024, whatever the density. For kinds with a grid.
     pub grid_cells: Option<[u32; 3]>,
-    /// References there may be for each prim in the cells of octrees, 1 to 1000. For `grid-octree` and `octree`.
+    /// Largest number of references per prim in the cells of octrees, 1 to 1000. For `grid-octree` and `octree`.
     pub max_references: Option<f64>,
-    /// What decides that a prim is listed in a cell, for grids and octrees.
+    /// Rule that assigns prims to cells, for grids and octrees.
     pub assign: Assign,
-    /// How far boxes of faces reach beyond them along their normals, with [`Assign::Box`]; the shapes' units, 0 to 10⁶.
+    /// Distance by which boxes of faces extend beyond them along their normals, with [`Assign::Box`]; in the shapes' units, 0
+    /// to 10⁶.
     pub thickness: f64,
-    /// What a ray remembers, for grids and octrees.
+    /// Kind of mailbox, for grids and octrees.
     pub mailbox: MailboxKind,
 }
 
 impl AccelParams {
-    /// All as suits the kind.
+    /// Every parameter at the default of the kind.
     pub const DEFAULT: Self = Self {
         density: None,
         max_resolution: None,
@@ -46,14 +47,14 @@ impl AccelParams {
         mailbox: MailboxKind::Exact,
     };
 
-    /// Whether every parameter is within its range.
+    /// Checks that every parameter is within its range.
     pub fn validate(&self) -> Result<(), ParamError> {
         let leaf_size = self.leaf_size.unwrap_or(1);
         check("leaf size", f64::from(leaf_size), (1..=1000).contains(&leaf_size), "1 to 1000")?;
         self.grid(AccelKind::GridOctree).validate()
     }
 
-    /// The parameters of the grid of a kind that has one.
+    /// Grid parameters of a kind that has a grid.
     pub fn grid(&self, kind: AccelKind) -> GridParams {
         let default = match kind {
             AccelKind::Grid => GridParams::UNIFORM,
@@ -79,7 +80,7 @@ impl AccelParams {
         }
     }
 
-    /// Prims of a leaf of `bvh` and `grid-bvh`.
+    /// Leaf size of `bvh` and `grid-bvh`, in prims.
     pub fn tree_leaf_size(&self) -> u32 {
         self.leaf_size.unwrap_or(bvh::LEAF_SIZE)
     }

@@ -1,4 +1,4 @@
-//! Counting is a type: timed runs carry [`NoProbe`], counted runs [`RayCounts`].
+//! Counting as a type parameter: timed runs carry [`NoProbe`], counted runs [`RayCounts`].
 //!
 //! Names are V. Havran's, from the statistics to Haines' Standard Procedural Databases (1999).
 
@@ -7,66 +7,66 @@ use crate::math::simd::LANES;
 use crate::math::{DVec3, Vec3};
 use std::ops::AddAssign;
 
-/// What a walk tells about itself while it runs.
+/// Observer of a walk.
 ///
 /// Costly details come as closures, which only probes that record them call.
 pub trait Probe: Default + Send {
-    /// Whether it hears nothing, so that rays may be asked in any way that gives the same answers.
+    /// Whether the probe records nothing, so that rays may be traced in any way that gives the same answers.
     const SILENT: bool = false;
 
-    /// Whether it counts so many rays that exact walks are compiled for every instruction set, or hears of few.
+    /// Whether the probe sees so many rays that exact walks are compiled for every instruction set for it.
     const OF_PICTURES: bool = Self::SILENT;
 
-    /// One ray was asked of the scene.
+    /// Records a query of one ray.
     fn query(&mut self) {}
-    /// A node or cell was entered (n_ts).
+    /// Records a step into a node or cell (n_ts).
     fn step(&mut self) {}
-    /// The node or cell that is visited, once for each step; probes that record nothing never call the closure.
+    /// Records the node or cell visited, once per step; probes that record nothing never call the closure.
     #[inline(always)]
     fn visit(&mut self, _visit: impl FnOnce() -> Visit) {}
-    /// A leaf cell was visited (n_ets), `empty` if nothing is listed in it (n_eets).
+    /// Records a visit to a leaf cell (n_ets), `empty` if nothing is listed in it (n_eets).
     fn cell(&mut self, _empty: bool) {}
-    /// One ray/prim test (n_it).
+    /// Records one ray/prim test (n_it).
     fn prim_test(&mut self) {}
-    /// So many ray/prim tests at once.
+    /// Records `count` ray/prim tests.
     fn prim_tests(&mut self, _count: u32) {}
-    /// What came of a test.
+    /// Records the outcome of a test.
     #[inline(always)]
     fn tested(&mut self, _test: impl FnOnce() -> Test) {}
-    /// What came of tests of a block of prims: the same for each that has its bit in `lanes`.
+    /// Records the outcome of tests of a block of prims: the same for each lane with its bit in `lanes`.
     #[inline(always)]
     fn lanes_tested(&mut self, _prims: &[u32; LANES], _lanes: u32, _outcome: Outcome) {}
-    /// A test of this prim that the mailbox saved (n_mb).
+    /// Records a test of this prim that the mailbox saved (n_mb).
     fn repeat_skipped(&mut self, _prim: u32) {}
-    /// So many ray/volume tests at once (n_bit).
+    /// Records `count` ray/volume tests (n_bit).
     fn volume_tests(&mut self, _count: usize) {}
-    /// So many corners and other points were transformed, into the ray's axes or to where an object stands (n_xf).
+    /// Records `count` transformed corners or other points, into the ray's axes or to an object's place (n_xf).
     fn transforms(&mut self, _count: usize) {}
-    /// The query found a hit.
+    /// Records that the query found a hit.
     fn found(&mut self) {}
 }
 
-/// A node or cell that a walk visits.
+/// Visit of a walk to a node or cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Visit {
-    /// Which one.
+    /// The node or cell.
     pub place: NodeId,
-    /// The room it takes, in the frame of the shapes.
+    /// Its extent in the frame of the shapes.
     pub extent: Extent,
-    /// Prims listed in it; `None` where it leads to other nodes.
+    /// Number of prims listed in it; `None` for an inner node.
     pub listed: Option<u32>,
 }
 
-/// A node or cell by its place in its structure.
+/// Identity of a node or cell in its structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NodeId {
     /// A cell of a grid, by column, row and layer.
     Cell([u32; 3]),
-    /// A node of an octree in a cell: its least corner and the logarithm of its side, in the finest cells there can be.
+    /// An octree node in a cell: its least corner and log2 of its side, in units of the finest possible cell.
     OctreeNode([u32; 3], u32),
-    /// A leaf of an octree, likewise.
+    /// An octree leaf, identified likewise.
     Octant([u32; 3], u32),
-    /// A node of a hierarchy.
+    /// An inner node of a hierarchy.
     Node(u32),
     /// A leaf of a hierarchy.
     Leaf(u32),
@@ -74,32 +74,32 @@ pub enum NodeId {
     Block(u32),
     /// A leaf of other prims.
     Run(u32),
-    /// A node of the hierarchy over the places where instanced objects stand.
+    /// A node of the hierarchy over the places of instanced objects.
     Places(u32),
-    /// A node of the tree of an instanced object: the first prim of the object where it stands, and the node.
+    /// A node of the tree of an instanced object: the first prim of the placed object, and the node.
     PlacedNode(u32, u32),
-    /// A block of triangles of an instanced object, likewise.
+    /// A block of triangles of an instanced object, identified likewise.
     PlacedBlock(u32, u32),
-    /// The volume around an object.
+    /// The bounding volume of an object.
     Object(u32),
 }
 
-/// The room of a node or cell.
+/// Extent of a node or cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Extent {
     /// A box.
     Box(Aabb),
     /// A sphere.
     Ball {
-        /// Its centre.
+        /// Centre of the sphere.
         center: DVec3,
-        /// Its radius.
+        /// Radius of the sphere.
         radius: f64,
     },
 }
 
 impl Extent {
-    /// The smallest box around it.
+    /// Smallest box around the extent.
     #[expect(clippy::cast_possible_truncation, reason = "a box to be looked at")]
     pub fn bounds(&self) -> Aabb {
         match *self {
@@ -112,37 +112,37 @@ impl Extent {
     }
 }
 
-/// A ray/prim test.
+/// Result of a ray/prim test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Test {
-    /// Which prim.
+    /// The prim tested.
     pub prim: u32,
-    /// Where the ray meets it; NaN where it does not, or where that was not computed.
+    /// Distance of the hit; NaN if the ray misses or the distance was not computed.
     pub t: f32,
-    /// What came of it.
+    /// Outcome of the test.
     pub outcome: Outcome,
 }
 
-/// What comes of a ray/prim test.
+/// Outcome of a ray/prim test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
-    /// The ray passes by.
+    /// The ray misses the prim.
     Miss,
-    /// It was in a block of prims but does not count: the ray starts on it, it is not opaque and only opaque
-    /// ones are looked for, or the answer is known already.
+    /// The prim is in a tested block but does not count: the ray starts on it, it is not opaque in a query for opaque prims
+    /// only, or the query is already answered.
     LeftOut,
-    /// It is hit, but not within the range that is asked about.
+    /// The prim is hit, but outside the query's range.
     OutOfRange,
-    /// It is hit where it lets light through, or may do so in part, and what stops light is looked for.
+    /// The prim is hit in an occlusion query, but lets light through there, or may do so in part.
     LetThrough,
-    /// It is hit, but a hit before it is known.
+    /// The prim is hit, but an earlier hit is known.
     Farther,
-    /// It is hit, before everything known so far.
+    /// The prim is hit, before all known hits.
     Hit,
 }
 
 impl Outcome {
-    /// As printed.
+    /// Name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Miss => "miss",
@@ -155,7 +155,7 @@ impl Outcome {
     }
 }
 
-/// Timed runs: every call is an empty inline function.
+/// Probe of timed runs: every call is an empty inline function.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoProbe;
 
@@ -163,12 +163,12 @@ impl Probe for NoProbe {
     const SILENT: bool = true;
 }
 
-/// Sums over the rays of one class; divide by `queries` for Havran's per-ray figures.
+/// Counts summed over the rays of one class; divide by `queries` for Havran's per-ray figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RayCounts {
-    /// Rays asked.
+    /// Queries, one per ray.
     pub queries: u64,
-    /// Rays that hit something.
+    /// Queries that found a hit.
     pub found: u64,
     /// Nodes and cells visited.
     pub n_ts: u64,
@@ -182,18 +182,18 @@ pub struct RayCounts {
     pub n_mb: u64,
     /// Ray/volume tests.
     pub n_bit: u64,
-    /// Points transformed into the axes of a ray, or to where an object stands.
+    /// Points transformed into the axes of a ray, or to an object's place.
     pub n_xf: u64,
 }
 
 impl RayCounts {
-    /// What is counted of rays, with the names of all tables and in their order.
+    /// All counts with their names, in the order of reports.
     pub fn named(&self) -> [(&'static str, u64); Count::ALL.len()] {
         Count::ALL.map(|count| (count.name(), count.of(self)))
     }
 }
 
-/// A count of [`RayCounts`].
+/// Name of a count in [`RayCounts`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Count {
     /// Ray/prim tests.
@@ -202,13 +202,13 @@ pub enum Count {
     Ts,
     /// Leaf cells visited.
     Ets,
-    /// Empty ones among them.
+    /// Empty leaf cells visited.
     Eets,
     /// Ray/volume tests.
     Bit,
     /// Tests saved by the mailbox.
     Mb,
-    /// Points transformed into the ray's axes, or corners of an instanced object to where it stands.
+    /// Points transformed into the ray's axes, or corners of instanced objects to their places.
     Xf,
 }
 
@@ -216,7 +216,7 @@ impl Count {
     /// Every count, in the order of reports.
     pub const ALL: [Self; 7] = [Self::It, Self::Ts, Self::Ets, Self::Eets, Self::Bit, Self::Mb, Self::Xf];
 
-    /// V. Havran's name, or ours in his manner.
+    /// V. Havran's name, or ours in his style.
     pub const fn name(self) -> &'static str {
         match self {
             Self::It => "n_it",
@@ -229,7 +229,7 @@ impl Count {
         }
     }
 
-    /// Its value.
+    /// Value of this count.
     pub const fn of(self, counts: &RayCounts) -> u64 {
         match self {
             Self::It => counts.n_it,

@@ -1,6 +1,6 @@
-//! What is common to the queries of every structure: the ray's set-up, the unbounded planes, the order of hits.
+//! Common part of the queries of all structures: ray set-up, unbounded planes, order of hits.
 //!
-//! A structure only decides which prims a ray is tested against ([`Culling`]); tests, order and counting happen here, so
+//! A structure only selects the prims that a ray is tested against ([`Culling`]); tests, order and counting happen here, so
 //! that no two structures can differ in them.
 
 use super::intersector::{Exact, Intersector};
@@ -12,21 +12,21 @@ use crate::math::simd::LANES;
 use crate::math::triangle::{self, Meeting, Triangle};
 use crate::math::triangles::{Corners8, Verdicts, corners_of};
 
-/// A structure: it names the prims that a ray may hit.
+/// A culling structure: selects the prims that a ray may hit.
 pub trait Culling: Sync {
-    /// What a walk writes to.
+    /// Scratch memory of a walk.
     type Scratch: Send;
 
-    /// The shapes it culls.
+    /// Shapes that the structure culls.
     fn shapes(&self) -> &Shapes;
 
-    /// A fresh scratch value.
+    /// Creates a scratch value.
     fn new_scratch(&self) -> Self::Scratch;
 
     /// Calls [`Query::test`] at least for every bounded prim that the ray hits within [`Query::reach`].
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, scratch: &mut Self::Scratch, probe: &mut P);
 
-    /// Answers a batch, one ray after another unless a structure knows better.
+    /// Answers a batch, one ray after another unless a structure overrides it.
     fn trace<W: QueryBatch, P: Probe>(&self, batch: &mut W, scratch: &mut Self::Scratch, probe: &mut P) {
         for i in 0..batch.rays().len() {
             let (mut query, usable) = begin(self.shapes(), batch, i, probe);
@@ -38,70 +38,70 @@ pub trait Culling: Sync {
     }
 }
 
-/// What a query looks for, and with which test.
+/// Kind of a query, with its ray/triangle test.
 pub trait Goal {
-    /// The test of triangles.
+    /// The ray/triangle test.
     type Test: Intersector;
 
-    /// Whether that is the exact one.
+    /// Whether [`Self::Test`] is the exact test.
     const EXACT: bool = <Self::Test as Intersector>::EXACT;
 
-    /// Whether any hit is the answer.
+    /// Whether any hit answers the query.
     const ANY: bool = false;
 
-    /// Whether hits with prims that are not opaque may matter at all.
+    /// Whether hits with non-opaque prims can count at all.
     #[inline(always)]
     fn wants_open(&self) -> bool {
         true
     }
 
-    /// Whether `prim`, which is hit within the ray's range, matters there.
+    /// Whether a hit with `prim` within the ray's range counts.
     #[inline(always)]
     fn minds(&self, _opaque: bool, _prim: u32) -> bool {
         true
     }
 
-    /// The filter of first hits, if there is one, and the ray's number in its batch.
+    /// Filter of first hits, if any, and the index of the ray in its batch.
     #[inline(always)]
     fn filter(&self) -> Option<(&dyn IntersectFilter, usize)> {
         None
     }
 
-    /// Whether a hit would be the answer so far.
+    /// Whether a hit would replace the best one so far.
     fn is_nearer(&self, t: f32, prim: u32) -> bool;
 
-    /// A hit within the ray's range was found that matters; what that means.
+    /// Takes a hit that counts, within the ray's range, and returns the outcome.
     fn offer(&mut self, t: f32, prim: u32) -> Outcome;
 
-    /// Hits beyond this distance do not matter any more.
+    /// Distance beyond which hits no longer count.
     fn reach(&self) -> f32;
 
-    /// The hit that is the answer so far, by distance and prim, where hits are asked for.
+    /// Distance and prim of the best hit so far; `None` if there is none or the query does not ask for hits.
     fn best(&self) -> Option<(f32, u32)>;
 
-    /// The test itself.
+    /// Returns the test.
     fn test(&self) -> Self::Test;
 }
 
-/// One ray under way.
+/// Query of one ray in progress.
 #[derive(Clone, Debug)]
 pub struct Query<'a, G: Goal> {
     /// The ray in sheared space.
     pub ray: RaySpace,
-    /// Hits count from here.
+    /// Smallest t of a hit.
     pub t_min: f32,
     t_max: f32,
     exclude: u32,
     shapes: &'a Shapes,
     prepared: <G::Test as Intersector>::Prepared,
     pub(super) goal: G,
-    /// Whether what is tested stops light wherever it is met, where it is not among the shapes.
+    /// Opacity of the tested prims, where they are not among the shapes.
     pub(super) opaque: Option<bool>,
-    /// The triangle that was offered last and taken, where it came from a block.
+    /// The last triangle that was offered and taken, if it came from a block.
     winner: Option<Winner>,
 }
 
-/// What the answer needs of a triangle, so that it is not looked up again.
+/// Data of the winning triangle for the final answer, so that it is not looked up again.
 #[derive(Clone, Copy, Debug)]
 struct Winner {
     prim: u32,
@@ -110,11 +110,11 @@ struct Winner {
 }
 
 impl<'a, G: Goal> Query<'a, G> {
-    /// A ray whose hits count from `t_min` on, and whether it can hit anything: not with a direction of zero, numbers that
-    /// are not finite, or an empty range.
+    /// Creates the query of a ray whose hits count from `t_min` on; also returns whether it can hit anything, which is false
+    /// for a zero direction, numbers that are not finite, or an empty range.
     #[inline(always)]
     pub(super) fn new(shapes: &'a Shapes, ray: &Ray, t_min: f32, goal: G) -> (Self, bool) {
-        // A distance that overflows is no hit, and `<=` is false for NaN.
+        // An overflowing distance is no hit, and `<=` is false for NaN.
         let t_max = if ray.t_max < f32::MAX { ray.t_max } else { f32::MAX };
         let (space, usable) = RaySpace::checked(ray.origin, ray.dir);
         let prepared = goal.test().prepare(&space);
@@ -125,19 +125,19 @@ impl<'a, G: Goal> Query<'a, G> {
         )
     }
 
-    /// Hits beyond this distance do not matter; shrinks as hits are found.
+    /// Distance beyond which hits no longer count; shrinks as hits are found.
     #[inline]
     pub fn reach(&self) -> f32 {
         self.t_max.min(self.goal.reach())
     }
 
-    /// Whether a prim is tested at all: not one that the ray excludes, or a hit of which would not matter.
+    /// Whether a prim is tested at all: false for the prim that the ray excludes, and for prims whose hits cannot count.
     #[inline]
     pub fn asks_for(&self, prim: u32) -> bool {
         prim != self.exclude && (self.goal.wants_open() || self.is_opaque(prim))
     }
 
-    /// Tests every prim that has bounds, until the query is answered.
+    /// Tests every bounded prim, until the query is answered.
     #[inline(never)]
     pub fn test_all<P: Probe>(&mut self, probe: &mut P) {
         for prim in 0..self.shapes.bounded() {
@@ -147,7 +147,7 @@ impl<'a, G: Goal> Query<'a, G> {
         }
     }
 
-    /// Tests one prim and tells whether the query is answered.
+    /// Tests one prim and returns whether the query is answered.
     #[inline]
     pub fn test<P: Probe>(&mut self, prim: u32, probe: &mut P) -> bool {
         if !self.asks_for(prim) {
@@ -174,7 +174,7 @@ impl<'a, G: Goal> Query<'a, G> {
         self.reach() < self.t_min
     }
 
-    /// Hands on a hit within the range; a NaN is none.
+    /// Passes a hit on to the goal if it is within the range; NaN is not.
     #[inline]
     fn offer(&mut self, t: f32, prim: u32) -> Outcome {
         if t >= self.t_min && t <= self.t_max {
@@ -189,21 +189,21 @@ impl<'a, G: Goal> Query<'a, G> {
         }
     }
 
-    /// Whether the filter rejects a hit that would be the answer.
+    /// Whether the filter rejects a hit that would become the best one.
     #[inline]
     fn passes(&self, t: f32, prim: u32) -> bool {
         let Some((filter, ray)) = self.goal.filter() else { return false };
         !self.is_opaque(prim) && self.goal.is_nearer(t, prim) && filter.rejects(ray, prim)
     }
 
-    /// Whether a prim stops light wherever it is met.
+    /// Whether a prim is opaque.
     #[inline]
     fn is_opaque(&self, prim: u32) -> bool {
         self.opaque.unwrap_or_else(|| self.shapes.opaque.get_or_set(prim))
     }
 
-    /// Takes the verdicts of a block's first `count` lanes, decides those that are open, and tells whether the query is
-    /// answered. The same hits as [`Self::test`] for each of them, if the test is exact.
+    /// Takes the verdicts on a block's first `count` lanes, decides the uncertain ones, and returns whether the query is
+    /// answered. Finds the same hits as [`Self::test`] for each lane, if the test is exact.
     #[inline(always)]
     pub fn test_block<P: Probe>(
         &mut self,
@@ -218,7 +218,7 @@ impl<'a, G: Goal> Query<'a, G> {
         })
     }
 
-    /// [`Self::test_block`] for triangles of which the caller knows that they are wanted; they need not be among the shapes.
+    /// [`Self::test_block`] for triangles that are known to count; they need not be among the shapes.
     #[inline(always)]
     pub(super) fn test_wanted_block<P: Probe>(
         &mut self,
@@ -238,8 +238,7 @@ impl<'a, G: Goal> Query<'a, G> {
         })
     }
 
-    /// Has `take` decide each lane that is not missed for certain, told whether it is hit for certain, until the query is
-    /// answered.
+    /// Calls `take` for each lane that is not a certain miss, with a flag for certain hits, until the query is answered.
     #[inline(always)]
     fn decide_open<P: Probe>(
         &mut self,
@@ -264,7 +263,7 @@ impl<'a, G: Goal> Query<'a, G> {
         false
     }
 
-    /// Offers the hit with a triangle that is hit for certain, or may be.
+    /// Offers a hit with a triangle, after deciding it unless it is `certain`; returns whether the query is answered.
     #[inline(never)]
     pub fn take<P: Probe>(&mut self, prim: u32, corners: &Triangle, certain: bool, probe: &mut P) -> bool {
         if !self.asks_for(prim) {
@@ -290,7 +289,7 @@ impl<'a, G: Goal> Query<'a, G> {
         self.reach() < self.t_min
     }
 
-    /// Tests the unbounded planes, which no structure holds, and tells whether the query is answered.
+    /// Tests the unbounded planes, which no structure contains, and returns whether the query is answered.
     #[inline(always)]
     pub fn test_planes<P: Probe>(&mut self, probe: &mut P) -> bool {
         !self.shapes.planes.is_empty() && self.test_each_plane(probe)
@@ -304,7 +303,7 @@ impl<'a, G: Goal> Query<'a, G> {
         (first..first + count).any(|plane| self.test(plane, probe))
     }
 
-    /// The hit that is the answer so far, with its barycentric weights, which only the winner needs.
+    /// Best hit so far, with its barycentric coordinates, which only the winner needs.
     #[inline]
     pub(super) fn hit(&self) -> Hit {
         let Some((t, prim)) = self.goal.best() else { return Hit::MISS };
@@ -317,7 +316,7 @@ impl<'a, G: Goal> Query<'a, G> {
         Hit { t, u, v, prim }
     }
 
-    /// The answer, where it is a hit with a triangle of a block, which need not be among the shapes.
+    /// Best hit so far, if it is with a triangle of a block, which need not be among the shapes.
     pub(super) fn hit_by_winner(&self) -> Option<Hit> {
         let (t, prim) = self.goal.best()?;
         let Winner { corners, meeting, .. } = self.winner.as_ref().filter(|winner| winner.prim == prim)?;
@@ -328,16 +327,16 @@ impl<'a, G: Goal> Query<'a, G> {
         Some(Hit { t, u, v, prim })
     }
 
-    /// What is asked about.
+    /// Shapes of the query.
     pub fn shapes(&self) -> &'a Shapes {
         self.shapes
     }
 }
 
-/// The first hit.
+/// Query for the first hit.
 pub struct Closest<'w, I> {
     best: (f32, u32),
-    /// The filter of hits, if there is one, and the ray's number in its batch.
+    /// Filter of hits, if any; `ray` is the index of the ray in its batch.
     filter: Option<&'w dyn IntersectFilter>,
     ray: usize,
     test: I,
@@ -376,10 +375,10 @@ impl<I: Intersector> Goal for Closest<'_, I> {
     }
 }
 
-/// Whether anything is hit that stops light: what is opaque, and what others say does so where it is hit.
+/// Query for occlusion: by any opaque prim, or by another one where the filter says that it blocks the ray.
 pub struct Occluded<'w, I> {
     pub(super) found: bool,
-    /// The filter of occlusion queries, if there is one, and the ray's number in its batch.
+    /// Filter of occlusion queries, if any; `ray` is the index of the ray in its batch.
     filter: Option<&'w dyn OccludedFilter>,
     ray: usize,
     test: I,
@@ -420,7 +419,7 @@ impl<I: Intersector> Goal for Occluded<'_, I> {
     }
 }
 
-/// The first hit after another.
+/// Query for the first hit after a given one.
 pub struct Next<'w, I> {
     after: (f32, u32),
     closest: Closest<'w, I>,
@@ -460,12 +459,12 @@ impl<'w, I> Closest<'w, I> {
         Self::before(&Hit::MISS, test)
     }
 
-    /// The first hit, if it comes before one that is known.
+    /// Goal of finding the first hit that precedes a known one.
     pub(super) fn before(known: &Hit, test: I) -> Self {
         Self { best: (known.t, known.prim), filter: None, ray: 0, test }
     }
 
-    /// The goal of the ray of this number in its batch, whose hits `filter` may reject.
+    /// Goal of ray `ray` of its batch, whose hits `filter` may reject.
     #[inline(always)]
     pub(super) fn passing(self, filter: Option<&'w dyn IntersectFilter>, ray: usize) -> Self {
         Self { filter, ray, ..self }
@@ -473,7 +472,7 @@ impl<'w, I> Closest<'w, I> {
 }
 
 impl<'w, I> Occluded<'w, I> {
-    /// The goal of the ray of this number in its batch, of which nothing is found yet.
+    /// Goal of ray `ray` of its batch, with nothing found yet.
     #[inline(always)]
     pub(super) fn by(filter: Option<&'w dyn OccludedFilter>, ray: usize, test: I) -> Self {
         Self { found: false, filter, ray, test }
@@ -481,7 +480,7 @@ impl<'w, I> Occluded<'w, I> {
 }
 
 impl<'w, I> Next<'w, I> {
-    /// What a search for the first hit finds, if it comes after another.
+    /// Goal of finding the first hit after `after`.
     pub(super) fn after(after: &Hit, closest: Closest<'w, I>) -> Self {
         Self { after: (after.t, after.prim), closest }
     }
@@ -518,7 +517,7 @@ impl<C: Culling> Accel for C {
     }
 }
 
-/// A structure whose triangles are tested by `I` instead of exactly.
+/// A structure whose triangles are tested by `I` instead of the exact test.
 #[derive(Clone, Copy, Debug)]
 pub struct Tested<'a, I, C> {
     structure: &'a C,
@@ -526,7 +525,7 @@ pub struct Tested<'a, I, C> {
 }
 
 impl<'a, I: Intersector, C: Culling> Tested<'a, I, C> {
-    /// `structure` with another test.
+    /// Combines `structure` with another test.
     pub fn new(structure: &'a C, test: I) -> Self {
         Self { structure, test }
     }
@@ -539,7 +538,7 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
         self.structure.new_scratch()
     }
 
-    // Pencils and filters are for the exact test.
+    // Pencils and filters work with the exact test only.
     fn first_hits<P: Probe>(&self, queries: &HitQueries, hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
         let (HitQueries { rays, after, .. }, filter, test) = (*queries, None, self.test);
         match after {

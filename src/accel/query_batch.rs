@@ -1,4 +1,4 @@
-//! Batches of rays that ask the same query: the three queries, and where their answers go.
+//! Batches of rays with the same query: the three kinds of query, and the destinations of their answers.
 //!
 //! A structure may trace the rays of a batch in any order and in any number at once.
 
@@ -9,17 +9,17 @@ use super::{Hit, IntersectFilter, Intersector, NO_PRIM, OccludedFilter, Probe, R
 use crate::math::Vec3;
 use crate::math::simd::{LANES, Row};
 
-/// Rays that start at one place, look for hits from there on without end, and exclude no prim.
+/// Unbounded rays from a common origin that exclude no prim.
 #[derive(Clone, Copy, Debug)]
 pub struct Pencil<'w> {
-    /// Where they start.
+    /// Common origin.
     pub origin: Vec3,
-    /// Their directions, by axis.
+    /// Directions, by axis.
     pub dirs: [&'w [f32]; 3],
 }
 
 impl Pencil<'_> {
-    /// The directions of eight of its rays from `start` on.
+    /// Directions of the eight rays from `start` on.
     #[inline(always)]
     pub(super) fn eight(&self, start: usize) -> [Row; 3] {
         let [x, y, z] = self.dirs;
@@ -30,75 +30,75 @@ impl Pencil<'_> {
         eight
     }
 
-    /// One of its rays, of no sample.
+    /// Ray `i` of the pencil, with sample 0.
     #[inline(always)]
     pub(super) fn ray(&self, i: usize) -> Ray {
         let [x, y, z] = self.dirs;
         Ray::new(self.origin, Vec3::new(x[i], y[i], z[i]))
     }
 
-    /// A part of its rays, as far as there are so many.
+    /// Sub-range of the rays; empty if the pencil has fewer.
     #[must_use]
     pub fn part(&self, rays: Range<usize>) -> Self {
         Self { dirs: self.dirs.map(|row| row.get(rays.clone()).unwrap_or(&[])), ..*self }
     }
 }
 
-/// Rays that ask the same query, and where the answers go.
+/// Rays with the same query, and the destinations of their answers.
 pub trait QueryBatch {
-    /// What they look for.
+    /// Kind of the query.
     type Goal: Goal;
 
-    /// The rays; there is an answer for each.
+    /// Rays of the batch; each gets one answer.
     fn rays(&self) -> &[Ray];
 
-    /// One of them, from wherever it is read soonest.
+    /// Ray `i`, read from its fastest source.
     #[inline(always)]
     fn ray(&self, i: usize) -> Ray {
         self.rays()[i]
     }
 
-    /// What a ray excludes.
+    /// Prim that ray `i` excludes.
     #[inline(always)]
     fn exclude(&self, i: usize) -> u32 {
         self.rays()[i].exclude
     }
 
-    /// From where on the hits of a ray count.
+    /// Smallest t of a hit of ray `i`.
     #[inline(always)]
     fn t_min(&self, i: usize) -> f32 {
         self.ray(i).t_min
     }
 
-    /// [`Self::t_min`] of rays that follow each other, of which the first is ray `start`; given are those of the rays.
+    /// Turns the rays' own `t_min` of consecutive rays from `start` on into those of [`Self::t_min`].
     #[inline(always)]
     fn adapt_t_min(&self, _start: usize, _t_min: &mut [f32]) {}
 
-    /// The rays once more, where they all start at one place.
+    /// The rays as a pencil, if they share one origin.
     #[inline(always)]
     fn pencil(&self) -> Option<Pencil<'_>> {
         None
     }
 
-    /// What rejects hits of its rays, if anything does.
+    /// Filter that rejects hits, if any.
     #[inline(always)]
     fn filter(&self) -> Option<&dyn IntersectFilter> {
         None
     }
 
-    /// What a ray looks for.
+    /// Goal of ray `i`.
     fn goal(&self, i: usize) -> Self::Goal;
 
-    /// Takes the answer of a ray whose hit, or miss, is known to the last bit.
+    /// Takes the answer of ray `i`: a hit or miss that is already exact to the last bit.
     fn take(&mut self, i: usize, hit: Hit);
 
-    /// [`Self::take`] for rays that follow each other.
+    /// [`Self::take`] for consecutive rays from `start` on.
     #[inline(always)]
     fn take_all(&mut self, start: usize, hits: &[Hit]) {
         (start..).zip(hits).for_each(|(i, hit)| self.take(i, *hit));
     }
 
-    /// Takes the answer of a query, and tells whether there was a hit.
+    /// Takes the answer from a finished query and returns whether there was a hit.
     fn answer(&mut self, i: usize, query: &Query<Self::Goal>) -> bool;
 }
 
@@ -256,7 +256,7 @@ impl<'w, I: Intersector> QueryBatch for NextBatch<'w, I> {
     }
 }
 
-/// The query of a ray of a batch, and whether it can hit anything. [`Query::test_planes`] comes next.
+/// Starts the query of ray `i`; also returns whether it can hit anything. Call [`Query::test_planes`] next.
 #[inline(always)]
 pub fn begin<'a, W: QueryBatch, P: Probe>(
     shapes: &'a Shapes,
@@ -268,7 +268,7 @@ pub fn begin<'a, W: QueryBatch, P: Probe>(
     Query::new(shapes, &batch.rays()[i], batch.t_min(i), batch.goal(i))
 }
 
-/// Gives the answer that was found.
+/// Hands the answer of a finished query to the batch.
 #[inline(always)]
 pub fn end<W: QueryBatch, P: Probe>(batch: &mut W, i: usize, query: &Query<W::Goal>, probe: &mut P) {
     if batch.answer(i, query) {

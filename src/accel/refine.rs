@@ -1,4 +1,4 @@
-//! The winner's data, computed once in `f64` and with a bound of its error.
+//! Refinement of the winning hit, computed once in `f64`, with an error bound.
 
 use super::shapes::Prim;
 use super::{Hit, Ray, Shapes};
@@ -8,44 +8,44 @@ use crate::math::shear::RaySpace;
 use crate::math::triangle::{Flat, Triangle};
 use crate::math::{DVec3, Vec3, cone, plane, polygon, sphere, triangle};
 
-/// Where and how a surface was hit, in the frame of the shapes.
+/// Geometry of a hit, in the frame of the shapes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refined {
-    /// The point.
+    /// Position of the hit.
     pub position: Vec3,
-    /// Where secondary rays start, but for the offset from the surface: `position`, or a place of the same face that
-    /// keeps away from its edges ([`inset`]).
+    /// Start of secondary rays before the offset from the surface: `position`, or a point of the same face that keeps away
+    /// from its edges ([`inset`]).
     pub start: Vec3,
-    /// How far, on each axis, `position` and `start` may be from exact points of the surface.
+    /// Bound, on each axis, of the distance of `position` and `start` from exact points of the surface.
     pub error: Vec3,
-    /// Unit geometric normal: the side from which a face runs counter-clockwise, outwards for a sphere or cone.
-    /// Zero for a face without area.
+    /// Unit geometric normal: towards the side from which a face is counter-clockwise, outwards for a sphere or cone. Zero
+    /// for a face without area.
     pub normal: Vec3,
-    /// Barycentric weight of the second corner; 0 but for triangles.
+    /// Barycentric weight of the second corner; 0 for other prims than triangles.
     pub u: f32,
-    /// Barycentric weight of the third corner; 0 but for triangles.
+    /// Barycentric weight of the third corner; 0 for other prims than triangles.
     pub v: f32,
 }
 
 impl Refined {
-    /// Where a secondary ray towards `dir` (of any length) starts: outside the error of the position, on the side of the
-    /// surface that it leaves to.
+    /// Origin of a secondary ray towards `dir` (of any length): outside the error of the position, on the side of the surface
+    /// that the ray leaves to.
     pub fn origin(&self, dir: Vec3) -> Vec3 {
         offset_origin(self.start, self.error, self.normal, dir)
     }
 }
 
 impl Shapes {
-    /// Position, error bound, normal and weights of a hit that a query of these shapes found on `ray`.
+    /// Position, error bound, normal and barycentric weights of a hit that a query of these shapes found on `ray`.
     ///
     /// # Panics
     ///
-    /// For a miss: [`Hit::is_some`] tells.
+    /// For a miss: check [`Hit::is_some`].
     pub fn refine(&self, ray: &Ray, hit: &Hit) -> Refined {
         self.prim(hit.prim).refine(ray, hit)
     }
 
-    /// Weights of the second and third corner where the ray hits triangle `prim`; 0 for other prims.
+    /// Barycentric weights of the second and third corner at the ray's hit with triangle `prim`; 0 for other prims.
     pub(super) fn barycentrics(&self, prim: u32, ray: &RaySpace) -> (f32, f32) {
         match self.prim(prim) {
             Prim::Triangle(corners) => triangle::barycentrics(ray, &corners),
@@ -55,7 +55,7 @@ impl Shapes {
 }
 
 impl Prim<'_> {
-    /// Position, error bound, normal and weights of a hit with this prim that a query found on `ray`.
+    /// Position, error bound, normal and barycentric weights of a hit with this prim that a query found on `ray`.
     pub fn refine(&self, ray: &Ray, hit: &Hit) -> Refined {
         if let Prim::Triangle(corners) = self {
             let plane = TrianglePlane::of(corners);
@@ -67,7 +67,7 @@ impl Prim<'_> {
         self.refine_with_care(ray, hit)
     }
 
-    /// Refines a hit of any prim and ray, wherever it lies.
+    /// Refines a hit of any prim and any ray, without shortcuts.
     fn refine_with_care(&self, ray: &Ray, hit: &Hit) -> Refined {
         let Some(space) = RaySpace::new(ray.origin, ray.dir) else {
             let position = ray.origin;
@@ -82,12 +82,12 @@ impl Prim<'_> {
                 let p = Located::on_ray(ray, f64::from(hit.t));
                 let (arm, normal) = sphere::project(p.position, s.center, s.radius);
                 let position = s.center.as_dvec3() + arm;
-                // One rounding of the sum, three of the arm.
+                // One rounding of the sum, three of `arm`.
                 let error = (position.abs() + arm.abs() * 3.0) * U64;
                 (Located { position, error }, normal.as_vec3())
             }
             Prim::Cone(c) => {
-                // The root that was rounded to the hit's: on a flat cone a rounded t would slide along the mantle.
+                // The root that was rounded to the hit's t: on a flat cone a rounded t would slide along the mantle.
                 let roots = cone::distances(&space, c, false).into_iter().filter(|t| !t.is_nan());
                 let off = |t: &f64| (t - f64::from(hit.t)).abs();
                 let t = roots.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(f64::from(hit.t));
@@ -109,7 +109,7 @@ impl Prim<'_> {
     }
 }
 
-/// What hits on one triangle share when they are refined.
+/// Data shared by the refinement of all hits on one triangle.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct TrianglePlane {
     pub flat: Flat,
@@ -123,8 +123,8 @@ impl TrianglePlane {
         Self { flat, rim: Rim::of(corners, flat.normal) }
     }
 
-    /// Position and error bound of a hit, as [`Shapes::refine`] finds them, and whether that is all: false where
-    /// distances need more than `f64`, and where secondary rays start elsewhere.
+    /// Position and error bound of a hit, as in [`Shapes::refine`], and whether they are final: false where the distance
+    /// needs more than `f64`, or where secondary rays start elsewhere.
     #[inline(always)]
     pub(crate) fn place(&self, origin: Vec3, dir: Vec3, weights: (f32, f32)) -> (Vec3, Vec3, bool) {
         let t = self.flat.distance(origin, dir);
@@ -133,14 +133,14 @@ impl TrianglePlane {
     }
 }
 
-/// A point and a bound of its error on each axis.
+/// A point, and a bound of its error on each axis.
 struct Located {
     position: DVec3,
     error: DVec3,
 }
 
 impl Located {
-    /// o + t d for a t with a relative error of [`POSITION_T`]: one rounding of the product, one of the sum.
+    /// Point o + t d for a t with a relative error of [`POSITION_T`]: one rounding of the product, one of the sum.
     fn on_ray(ray: &Ray, t: f64) -> Self {
         Self::along(ray.origin, ray.dir, t)
     }
@@ -152,12 +152,12 @@ impl Located {
         Self { position, error: step.abs() * (POSITION_T + U64) + position.abs() * U64 }
     }
 
-    /// Moved by a way whose rounding is far below that of a position in `f32`.
+    /// Moves the point by a vector whose rounding is far below that of a position in `f32`.
     fn moved(&self, way: DVec3) -> Self {
         Self { position: self.position + way, error: self.error }
     }
 
-    /// Rounded to `f32`, with the rounding added to the error: u of the position, or half the smallest number.
+    /// Rounds to `f32` and adds the rounding to the error: u of the position, or half the smallest number.
     #[inline(always)]
     fn rounded(&self) -> (Vec3, Vec3) {
         let position = self.position.as_vec3();
@@ -178,7 +178,7 @@ mod tests {
         for i in 0..4000 {
             let vertices = vec![random.cube(), random.cube(), random.cube()];
             let shapes = Shapes { vertices, triangles: vec![[0, 1, 2]], ..Shapes::default() };
-            // Within the triangle, and near an edge.
+            // Inside the triangle, and near an edge.
             let near = if i % 2 == 0 { 0.5 } else { 1e-6 };
             let (u, v) = (random.unit() * 0.5, random.unit() * near);
             let origin = random.cube() * 9.0;

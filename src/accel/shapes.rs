@@ -1,7 +1,6 @@
-//! The shapes a structure culls: flat arrays in one centred `f32` frame.
+//! Shapes that a structure culls: flat arrays in one centred `f32` frame.
 //!
-//! Prim ids run over all kinds: first the triangles, then the polygons, then the spheres, then the
-//! cones, then the planes.
+//! Prim ids run over all kinds in order: triangles, polygons, spheres, cones, planes.
 
 use std::ops::Range;
 
@@ -13,7 +12,7 @@ use crate::math::shear::RaySpace;
 use crate::math::triangle::{self, Triangle};
 use crate::math::{Vec3, plane, sphere};
 
-/// Everything that can be hit.
+/// All shapes of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct Shapes {
     /// Corners of triangles and polygons, relative to the scene's centre. Finite.
@@ -30,14 +29,14 @@ pub struct Shapes {
     pub cones: Vec<Cone>,
     /// Unbounded planes (unit normal n, offset d: n·p = d); tested before every structure.
     pub planes: Vec<(Vec3, f32)>,
-    /// One bit per prim: a hit always stops light. Prims beyond its end are opaque; empty: all are.
+    /// One bit per prim, set if it is opaque. Prims beyond its end are opaque; empty: all are.
     pub opaque: BitSet,
-    /// Where each object made of faces begins: its first triangle and its first polygon, both counted from 0; ascending.
-    /// Empty: all faces are one object.
+    /// Start of each object made of faces: its first triangle and its first polygon, both counted from 0; ascending. Empty:
+    /// all faces are one object.
     pub face_runs: Vec<[u32; 2]>,
 }
 
-/// Prims that belong together: a glTF primitive or an OBJ `o`/`g`/`usemtl` run where it stands, or a single other prim.
+/// Prims that belong together: a placed glTF primitive or OBJ `o`/`g`/`usemtl` run, or a single other prim.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Object {
     triangles: Range<u32>,
@@ -45,18 +44,18 @@ pub struct Object {
 }
 
 impl Object {
-    /// How many prims it has.
+    /// Number of prims.
     pub fn len(&self) -> u32 {
         let length = |range: &Range<u32>| range.end - range.start;
         length(&self.triangles) + length(&self.others)
     }
 
-    /// Whether it has none.
+    /// Whether the object has no prims.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Its prims, ascending.
+    /// Prims of the object, ascending.
     pub fn prims(&self) -> impl Iterator<Item = u32> + Clone + use<> {
         self.triangles.clone().chain(self.others.clone())
     }
@@ -78,7 +77,7 @@ pub struct BitSet {
 }
 
 impl BitSet {
-    /// `len` bits, all equal to `value`.
+    /// Creates `len` bits, all equal to `value`.
     pub fn filled(len: usize, value: bool) -> Self {
         Self { words: vec![if value { u64::MAX } else { 0 }; len.div_ceil(64)] }
     }
@@ -87,12 +86,12 @@ impl BitSet {
     ///
     /// # Panics
     ///
-    /// Beyond the last.
+    /// If `i` is beyond the last bit.
     pub fn get(&self, i: u32) -> bool {
         self.words[i as usize / 64] >> (i % 64) & 1 == 1
     }
 
-    /// Bit `i`; set where there is none.
+    /// Bit `i`, or `true` beyond the last bit.
     #[inline]
     pub fn get_or_set(&self, i: u32) -> bool {
         self.words.get(i as usize / 64).copied().unwrap_or(u64::MAX) >> (i % 64) & 1 == 1
@@ -102,7 +101,7 @@ impl BitSet {
     ///
     /// # Panics
     ///
-    /// Beyond the last.
+    /// If `i` is beyond the last bit.
     pub fn set(&mut self, i: u32, value: bool) {
         let mask = 1u64 << (i % 64);
         let word = &mut self.words[i as usize / 64];
@@ -116,17 +115,17 @@ impl Shapes {
         self.bounded() as usize + self.planes.len()
     }
 
-    /// Whether there is nothing to hit.
+    /// Whether there are no prims.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Prims that have bounds: all but the planes. They come first.
+    /// Number of prims that have bounds: all but the planes. They come first.
     pub fn bounded(&self) -> u32 {
         index(self.triangles.len() + self.polygons.len() + self.spheres.len() + self.cones.len())
     }
 
-    /// All objects that have bounded prims: those of faces, then each sphere and cone.
+    /// All objects with bounded prims: those of faces, then each sphere and cone.
     pub fn objects(&self) -> Vec<Object> {
         let (triangles, polygons) = (index(self.triangles.len()), index(self.polygons.len()));
         let mut starts = self.face_runs.clone();
@@ -144,11 +143,11 @@ impl Shapes {
         faces.chain((triangles + polygons..self.bounded()).map(single)).collect()
     }
 
-    /// What prim `prim` is.
+    /// Prim number `prim`.
     ///
     /// # Panics
     ///
-    /// Where there is none of that number, such as [`NO_PRIM`](super::NO_PRIM).
+    /// If there is no such prim, for example with [`NO_PRIM`](super::NO_PRIM).
     #[inline]
     pub fn prim(&self, prim: u32) -> Prim<'_> {
         let mut i = prim as usize;
@@ -178,21 +177,21 @@ impl Shapes {
         [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
     }
 
-    /// The corners of triangle `prim`.
+    /// Corners of triangle `prim`.
     #[inline]
     pub fn triangle(&self, prim: u32) -> Triangle {
         self.corners(self.triangles[prim as usize])
     }
 
-    /// Where the line through the ray meets prim `prim`, which is no triangle: up to two distances, NaN for "not". A
+    /// Distances at which the line through the ray meets prim `prim`, which is not a triangle: up to two, NaN for none. A
     /// function of ray and prim alone. With `ahead`, negative distances may be left out.
     #[inline(never)]
     pub(super) fn other_distances(&self, prim: u32, ray: &RaySpace, ahead: bool) -> [f32; 2] {
         self.prim(prim).distances(ray, ahead)
     }
 
-    /// The smallest box around prim `prim`, which is not a plane; those of spheres and cones are rounded outwards, by
-    /// [`ROUND_ROOM`] at least.
+    /// Smallest box around prim `prim`, which is not a plane; boxes of spheres and cones are rounded outwards, by at least
+    /// [`ROUND_ROOM`].
     pub fn bounds(&self, prim: u32) -> Aabb {
         match self.prim(prim) {
             Prim::Triangle(corners) => Aabb::around(corners),
@@ -210,7 +209,7 @@ impl Shapes {
 /// One prim.
 #[derive(Clone, Copy, Debug)]
 pub enum Prim<'a> {
-    /// Three corners.
+    /// A triangle by its three corners.
     Triangle(Triangle),
     /// A planar n-gon.
     Polygon(Polygon<'a>),
@@ -223,8 +222,8 @@ pub enum Prim<'a> {
 }
 
 impl Prim<'_> {
-    /// Where the line through the ray meets it: up to two distances, NaN for "not". With `ahead`, negative distances may be left
-    /// out.
+    /// Distances at which the line through the ray meets the prim: up to two, NaN for none. With `ahead`, negative distances
+    /// may be left out.
     #[inline]
     pub(crate) fn distances(&self, ray: &RaySpace, ahead: bool) -> [f32; 2] {
         match *self {

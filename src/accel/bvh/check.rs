@@ -1,4 +1,4 @@
-//! Proof that a built hierarchy can lose no hit, and its sizes.
+//! Sizes of a built hierarchy, and the proof that it can lose no hit.
 
 use super::Bvh;
 use super::tree::Below;
@@ -7,7 +7,7 @@ use crate::accel::stats::listed_once;
 use crate::math::aabb::Aabb;
 
 impl Bvh<'_> {
-    /// Sizes, counted by visiting every node. Cells are leaves.
+    /// Counts the sizes by visiting every node. Cells are leaves.
     pub fn summary(&self) -> StructureStats {
         let mut stats = StructureStats { bytes: self.tree.bytes() as u64, ..StructureStats::default() };
         if self.shapes.bounded() > 0 {
@@ -23,7 +23,7 @@ impl Bvh<'_> {
         stats
     }
 
-    /// Visits everything: each bounded prim is in one leaf, and the box of every node holds all that is below it.
+    /// Visits everything: each bounded prim is in exactly one leaf, and the box of every node contains all that is below it.
     pub fn check(&self) -> Result<StructureStats, String> {
         let mut leaves = vec![0u32; self.shapes.bounded() as usize];
         let leaf = |prims: &[u32]| {

@@ -1,9 +1,9 @@
-//! A hierarchy of bounding boxes as a binary tree; of two children the nearer is visited first.
+//! Binary bounding volume hierarchy; the nearer of two children is visited first.
 //!
-//! S. Rubin, T. Whitted, *A 3-Dimensional Representation for Fast Rendering of Complex Scenes*, 1980; the order by
-//! distance is T. Kay's and J. Kajiya's, *Ray Tracing Complex Scenes*, 1986. Boxes are cut in two by the surface area
-//! heuristic in bins ([`Splitting::SurfaceArea`](super::Splitting)) until a leaf is small enough. One ray, one box and one
-//! prim at a time: `fast-bvh` is the same with eight of each.
+//! S. Rubin, T. Whitted, *A 3-Dimensional Representation for Fast Rendering of Complex Scenes*, 1980; the order by distance
+//! is T. Kay's and J. Kajiya's, *Ray Tracing Complex Scenes*, 1986. Nodes are split by the binned surface area heuristic
+//! ([`Splitting::SurfaceArea`](super::Splitting)) until a leaf is small enough. The walk tests one ray, one box and one prim
+//! at a time: `fast-bvh` is the same with eight of each.
 
 mod check;
 pub mod tree;
@@ -14,19 +14,19 @@ use super::slabs::BoxRay;
 use super::wide::split::Item;
 use super::{Probe, Shapes};
 
-/// Prims of a leaf where nothing else is asked for.
+/// Default number of prims in a leaf.
 pub const LEAF_SIZE: u32 = 2;
 
-/// The hierarchy.
+/// Binary hierarchy of boxes over the bounded prims.
 #[derive(Clone, Debug)]
 pub struct Bvh<'a> {
     shapes: &'a Shapes,
-    /// Its root is node 0; there is none without bounded prims.
+    /// The root is node 0; there is none without bounded prims.
     tree: Tree,
 }
 
 impl<'a> Bvh<'a> {
-    /// Builds it over the bounded prims, leaves of at most `leaf_size`; the same for every number of threads.
+    /// Builds the hierarchy over the bounded prims, with leaves of at most `leaf_size`; the same for every number of threads.
     pub fn build(shapes: &'a Shapes, leaf_size: u32) -> Self {
         let item = |prim| Item::of(shapes, prim);
         let mut items: Vec<Item> = (0..shapes.bounded()).map(item).collect();

@@ -1,4 +1,4 @@
-//! Nodes as one flat array, from the root down, and the way of a ray through them.
+//! Nodes as one flat array, from the root down, and the traversal of a ray.
 
 use super::super::query::{Goal, Query};
 use super::super::slabs::{BoxRay, limit};
@@ -7,49 +7,49 @@ use crate::accel::Probe;
 use crate::accel::probe::{Extent, NodeId, Visit};
 use crate::math::aabb::Aabb;
 
-/// Prims that are worth a thread's while.
+/// Fewest prims for which splitting runs in parallel.
 const PARALLEL: usize = 4096;
 
-/// A box and what is in it.
+/// A node: its box and its content.
 #[derive(Clone, Copy, Debug)]
 pub struct Node {
-    /// Holds everything below.
+    /// Contains everything below the node.
     pub bounds: Aabb,
-    /// Of a leaf the first of its prims; of another node its second child, the first follows the node itself.
+    /// Leaf: index of its first prim. Inner node: index of its second child; the first child follows the node itself.
     at: u32,
-    /// Prims of a leaf, at least 1; 0: no leaf.
+    /// Number of prims of a leaf, at least 1; 0 marks an inner node.
     count: u32,
 }
 
-/// What a node leads to.
+/// Content of a node.
 #[derive(Clone, Copy, Debug)]
 pub enum Below<'a> {
     /// The prims of a leaf.
     Leaf(&'a [u32]),
-    /// Two nodes.
+    /// The two children of an inner node.
     Children([u32; 2]),
 }
 
-/// A tree, or several of them in a row.
+/// One tree, or several of them in a row.
 #[derive(Clone, Debug, Default)]
 pub struct Tree {
     nodes: Vec<Node>,
     prims: Vec<u32>,
-    /// Whether what it calls prims are places where objects stand.
+    /// Whether the "prims" of the tree are places of instanced objects.
     of_places: bool,
 }
 
-/// Nodes still to be visited with the distances at which the ray enters them, the nearest last.
+/// Stack of nodes still to be visited, with the distances at which the ray enters them, the nearest last.
 #[derive(Clone, Debug, Default)]
 pub struct Stack(Vec<(f64, u32)>);
 
 impl Tree {
-    /// One that is to be over places where objects stand.
+    /// Creates an empty tree over places of instanced objects.
     pub(in crate::accel) fn of_places() -> Self {
         Self { of_places: true, ..Self::default() }
     }
 
-    /// Adds the tree over some prims, at least one; its root. The same for every number of threads.
+    /// Adds a tree over at least one item and returns its root. The result does not depend on the number of threads.
     pub(in crate::accel) fn add(&mut self, items: &mut [Item], leaf_size: usize) -> u32 {
         let root = index(self.nodes.len());
         self.grow(items, around(items), leaf_size.max(1));
@@ -87,7 +87,7 @@ impl Tree {
         }
     }
 
-    /// Adds all nodes of another; how far they moved.
+    /// Appends all nodes of another tree and returns by how much their indices moved.
     pub(in crate::accel) fn append(&mut self, part: Self) -> u32 {
         let (nodes, prims) = (index(self.nodes.len()), index(self.prims.len()));
         let moved = |n: Node| Node { at: n.at + if n.count == 0 { nodes } else { prims }, ..n };
@@ -96,12 +96,12 @@ impl Tree {
         nodes
     }
 
-    /// The box of a node.
+    /// Box of a node.
     pub fn bounds(&self, node: u32) -> &Aabb {
         &self.nodes[node as usize].bounds
     }
 
-    /// What is below a node.
+    /// Content of a node.
     #[inline]
     pub fn below(&self, node: u32) -> Below<'_> {
         let Node { at, count, .. } = self.nodes[node as usize];
@@ -120,12 +120,12 @@ impl Tree {
         Visit { place, extent: Extent::Box(*self.bounds(node)), listed }
     }
 
-    /// Bytes of the arrays.
+    /// Size of the arrays, in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.nodes) + size_of_val(&*self.prims)
     }
 
-    /// Calls `found` with each node below one, itself included, and its depth below that.
+    /// Calls `found` with each node of the subtree below `node`, itself included, and its depth in the tree.
     pub fn each<'t>(&'t self, node: u32, depth: u32, found: &mut impl FnMut(u32, u32, Below<'t>)) {
         let below = self.below(node);
         found(node, depth, below);
@@ -134,8 +134,8 @@ impl Tree {
         }
     }
 
-    /// A node below a root whose box does not hold all that is below it, and the box of that; `leaf` finds the box of what a
-    /// leaf holds, and hears of each leaf once.
+    /// Finds a node below `root` whose box does not contain everything below it, and the box it should have; `leaf` returns
+    /// the box of a leaf's prims and is called once per leaf.
     pub fn fault(&self, root: u32, mut leaf: impl FnMut(&[u32]) -> Aabb) -> Option<(u32, Aabb)> {
         let mut fault = None;
         self.each(root, 0, &mut |node, _, below| {
@@ -150,8 +150,8 @@ impl Tree {
         fault
     }
 
-    /// Leads a ray from a root to the leaves whose boxes it enters, nearer ones first; whether `visit`, which tests the
-    /// prims of a leaf, answered the query.
+    /// Traverses the tree from `root`, nearer children first, and calls `visit` to test the prims of each leaf the ray
+    /// enters; returns whether `visit` answered the query.
     #[inline]
     pub fn walk<G: Goal, P: Probe>(
         &self,

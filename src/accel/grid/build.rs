@@ -1,6 +1,6 @@
-//! From shapes to cells: lists of the top grid by counting sort, crowded cells split into octrees.
+//! Building the cells: lists of the top grid by counting sort, crowded cells split into octrees.
 //!
-//! Work is cut into runs of fixed size whose results are joined in order, so that the structure does not depend on the
+//! Work is divided into runs of fixed size whose results are joined in order, so that the structure does not depend on the
 //! number of threads.
 
 use rayon::prelude::*;
@@ -11,7 +11,7 @@ use super::overlap::{Overlap, padded_box};
 use super::{EMPTY, GridParams};
 use crate::accel::Shapes;
 
-/// Prims or cells in one run of work.
+/// Number of prims or cells in one run of work.
 const RUN: usize = 4096;
 
 /// Builds the top grid's entries and everything below them.
@@ -38,7 +38,7 @@ pub(super) fn build(shapes: &Shapes, lattice: &Lattice, params: &GridParams) -> 
     (top, cells)
 }
 
-/// The prims of each top cell, ascending: prefix sums into one array.
+/// Prims of each top cell, ascending, as prefix sums into one array.
 struct Lists {
     first: Vec<u32>,
     prims: Vec<u32>,
@@ -65,7 +65,7 @@ fn top_lists(shapes: &Shapes, lattice: &Lattice) -> Lists {
         })
         .collect();
 
-    // Count one place to the left, so that the scatter leaves each count at the start of its list.
+    // Counts are stored one place to the left, so that the scatter leaves each of them at the start of its list.
     let mut first = vec![0u32; lattice.top_len() + 2];
     for &(cell, _) in pairs.iter().flatten() {
         first[cell as usize + 2] += 1;
@@ -82,7 +82,7 @@ fn top_lists(shapes: &Shapes, lattice: &Lattice) -> Lists {
     Lists { first, prims: sorted }
 }
 
-/// Calls `found` with the index of each top cell that the prim belongs to.
+/// Calls `found` with the index of each top cell that the prim overlaps.
 fn top_cells(shapes: &Shapes, prim: u32, lattice: &Lattice, mut found: impl FnMut(u32)) {
     #[expect(clippy::cast_possible_truncation, reason = "at most 1024³ = 2³⁰ cells")]
     let mut found = |cell| found(lattice.top_index(cell) as u32);

@@ -1,4 +1,4 @@
-//! Proof that a built grid can lose no hit, and its sizes.
+//! Sizes of a built grid, and the proof that it can lose no hit.
 
 use super::lattice::Cube;
 use super::overlap::Overlap;
@@ -6,7 +6,7 @@ use super::{EMPTY, GridOctree, NODE};
 use crate::accel::StructureStats;
 
 impl<M> GridOctree<'_, M> {
-    /// Sizes, counted by visiting every cell.
+    /// Counts the sizes by visiting every cell.
     pub fn summary(&self) -> StructureStats {
         let mut stats = StructureStats {
             n_in: 1 + self.cells.nodes.len() as u64,
@@ -23,8 +23,8 @@ impl<M> GridOctree<'_, M> {
         stats
     }
 
-    /// Visits everything: lists ascend, name existing prims only, and each prim is listed in every cell that it touches,
-    /// padded, and in no other; hierarchies hold what their cells list.
+    /// Visits everything: lists ascend and contain existing prims only, each prim is listed in exactly the padded cells that
+    /// it overlaps, and the hierarchies hold the prims that their cells list.
     pub fn check(&self) -> Result<StructureStats, String> {
         let stats = self.summary();
         let prims = self.shapes.bounded();
@@ -54,7 +54,7 @@ impl<M> GridOctree<'_, M> {
                 }
             }
         });
-        // Every prim from the top down: what it touches must list it.
+        // For every prim, from the top down: each cell it overlaps must list it.
         let mut touched = 0;
         for (prim, overlap) in (0..prims).zip(&overlaps) {
             self.each_cell_of(overlap, &mut |cube, cell| {
@@ -71,14 +71,14 @@ impl<M> GridOctree<'_, M> {
         }
     }
 
-    /// Every leaf with its cube.
+    /// Calls `found` with every leaf cell and its cube.
     pub(super) fn each_cell(&self, found: &mut impl FnMut(Cube, u32)) {
         for (i, &entry) in self.top.iter().enumerate() {
             self.below(self.lattice.top_cube(self.lattice.top_cell(i)), entry, &|_| true, found);
         }
     }
 
-    /// Every leaf that the prim touches.
+    /// Calls `found` with every leaf cell that the prim overlaps.
     fn each_cell_of(&self, overlap: &Overlap, found: &mut impl FnMut(Cube, u32)) {
         let (from, to) = self.lattice.top_range(overlap.lo, overlap.hi);
         for z in from[2]..=to[2] {

@@ -1,8 +1,7 @@
-//! Where the cells lie: the map from the shapes' frame to a lattice of finest cells.
+//! Map from the frame of the shapes to an integer lattice of finest cells.
 //!
-//! All of building and walking happens in units of the finest cell an octree can reach, as integers where cells are
-//! meant and as `f64` where points are. A top cell is 2^levels finest cells wide, the cell of an octree node half of its
-//! parent's.
+//! Building and walking use the finest cell an octree can reach as their unit: integers for cells, `f64` for points. A top
+//! cell is 2^levels finest cells wide, the cell of an octree node half as wide as its parent's.
 
 use super::params::{Assign, GridParams, MOST_CELLS};
 use crate::accel::shapes::{Prim, Shapes};
@@ -12,39 +11,39 @@ use crate::math::bounds::{
 };
 use crate::math::{DVec3, Vec3, Vec3Swizzles as _, triangle};
 
-/// Most finest cells along an axis, R in the derivation of [`CELL_PAD`].
+/// Largest number of finest cells along an axis, R in the derivation of [`CELL_PAD`].
 const MAX_FINE: u32 = 1 << 16;
 
-/// References a prim may have in the top grid on average, roughly.
+/// Average number of references per prim in the top grid, at most, roughly.
 const TOP_REFERENCES: f64 = 6.0;
 
-/// What building and walking allow for; lengths in finest cells.
+/// Safety margins of building and walking; lengths in finest cells.
 #[derive(Clone, Copy, Debug)]
 pub struct CellMargins {
-    /// How far beyond a cell prims are still listed in it.
+    /// Padding of a cell: prims this far outside are still listed in it.
     pub pad: f64,
-    /// How much larger than its content the grid is on each side, relative to its extent.
+    /// Margin by which the grid exceeds its content on each side, relative to the extent.
     pub room: f64,
     /// How far behind the best hit cells are still visited, relative to its distance.
     pub lag: f64,
-    /// How much farther, where an ulp is no fraction of its distance.
+    /// Absolute addition to `lag`, for distances so small that an ulp is no fraction of them.
     pub underflow: f64,
-    /// How far from the grid's corner a ray may start that is led through cells.
+    /// Largest distance from the grid's corner at which a ray may start that is led through cells.
     pub ray_cells: f64,
-    /// What a zero in a direction is replaced by.
+    /// Replacement for a zero component of the direction.
     pub no_slope: f64,
-    /// Whether the walk through octants is kept from leaving a cell but through the face it meets first.
+    /// Whether the walk through octants may leave a cell only through the face it meets first.
     pub guarded: bool,
 }
 
 impl CellMargins {
-    /// How far before and behind a distance cells are visited for hits there.
+    /// Distance before and behind `t` over which cells are visited for hits at `t`.
     #[inline]
     pub fn behind(&self, t: f64) -> f64 {
         t.abs() * self.lag + self.underflow
     }
 
-    /// Those that `math::bounds` derives.
+    /// Margins derived in `math::bounds`.
     pub const DERIVED: Self = Self {
         pad: CELL_PAD,
         room: GRID_ROOM,
@@ -55,7 +54,7 @@ impl CellMargins {
         guarded: true,
     };
 
-    /// Margins for rays that start nearer: cells and grid are hardly larger than their content.
+    /// Margins for rays that start nearer: cells and grid hardly exceed their content.
     pub const NEAR: Self =
         Self { pad: NEAR_CELL_PAD, room: NEAR_GRID_ROOM, ray_cells: NEAR_RAY_CELLS, ..Self::DERIVED };
 }
@@ -69,18 +68,18 @@ pub struct Lattice {
     pub scale: DVec3,
     /// Top cells on each axis.
     pub dims: [u32; 3],
-    /// Levels an octree below a top cell may have.
+    /// Largest number of octree levels below a top cell.
     pub levels: u32,
-    /// What decides that a prim is listed in a cell.
+    /// Rule that assigns prims to cells.
     pub assign: Assign,
     /// [`GridParams::thickness`].
     pub thickness: f64,
-    /// What is allowed for.
+    /// Safety margins.
     pub margins: CellMargins,
 }
 
 impl Lattice {
-    /// Cells as near to cubes as possible, `density` of them for each of the bounded prims.
+    /// Creates a lattice with cells as near to cubes as possible, `density` of them per bounded prim.
     ///
     /// J. Cleary, G. Wyvill, *Analysis of an Algorithm for Fast Ray Tracing Using Uniform Space Subdivision*, 1988.
     pub fn new(shapes: &Shapes, params: &GridParams, margins: CellMargins) -> Self {
@@ -92,7 +91,7 @@ impl Lattice {
         };
         let (lo, hi) = if prims == 0 { (DVec3::ZERO, DVec3::ONE) } else { (0..prims).fold(nothing, join) };
 
-        // A flat or line-like scene gets a thin box, one that is a point a small one: no side is zero.
+        // A flat or line-like scene gets a thin box, a single point a small one: no side is zero.
         let longest = (hi - lo).max_element();
         let longest = if longest > 0.0 { longest } else { lo.abs().max_element().max(f64::from(f32::MIN_POSITIVE)) };
         let extent = (hi - lo).max(DVec3::splat(longest / 1024.0));
@@ -115,22 +114,22 @@ impl Lattice {
         }
     }
 
-    /// Finest cells on each axis.
+    /// Number of finest cells on each axis.
     pub fn fine_dims(&self) -> [u32; 3] {
         self.dims.map(|n| n << self.levels)
     }
 
-    /// A point in units of finest cells.
+    /// Converts a point to units of finest cells.
     pub fn place(&self, p: Vec3) -> DVec3 {
         self.place_f64(p.as_dvec3())
     }
 
-    /// [`Self::place`] of a point that is no vertex.
+    /// [`Self::place`] for a point in `f64`.
     pub fn place_f64(&self, p: DVec3) -> DVec3 {
         (p - self.lo) * self.scale
     }
 
-    /// The top cells that meet a box in finest cells: first and last on each axis.
+    /// Range of top cells that overlap a box given in finest cells: first and last on each axis.
     pub fn top_range(&self, lo: DVec3, hi: DVec3) -> ([u32; 3], [u32; 3]) {
         let side = f64::from(1u32 << self.levels);
         #[expect(
@@ -142,15 +141,15 @@ impl Lattice {
         ([0, 1, 2].map(|k| cell(lo[k], k)), [0, 1, 2].map(|k| cell(hi[k], k)))
     }
 
-    /// A top cell as a cube of finest cells.
+    /// Cube of finest cells that a top cell covers.
     pub fn top_cube(&self, cell: [u32; 3]) -> Cube {
         Cube { lo: cell.map(|c| c << self.levels), level: self.levels }
     }
 
-    /// The box of a cube and its padding in the frame of the shapes, rounded outwards.
+    /// Padded box of a cube in the frame of the shapes, rounded outwards.
     ///
-    /// Rounding in `f64` moves it by 3 u of its coordinates. The padding is more than 2⁻⁴⁹ of them, of which the walk needs
-    /// a small part ([`CELL_PAD`]): `f32` coordinates that differ do so by 2⁻²⁴ at least, and that is 2¹⁶ cells at most.
+    /// Rounding in `f64` moves the box by 3 u of its coordinates. The padding is more than 2⁻⁴⁹ of them, of which the walk
+    /// needs a small part ([`CELL_PAD`]): different `f32` coordinates differ by at least 2⁻²⁴, which is at most 2¹⁶ cells.
     pub fn padded_bounds(&self, cube: Cube) -> Aabb {
         let lo = DVec3::from_array(cube.lo.map(f64::from));
         let place = |p: DVec3| (self.lo + p / self.scale).as_vec3();
@@ -158,7 +157,7 @@ impl Lattice {
         Aabb { lo: lo.map(f32::next_down), hi: hi.map(f32::next_up) }
     }
 
-    /// The box of a cube in the frame of the shapes, rounded.
+    /// Box of a cube in the frame of the shapes, rounded to nearest.
     pub fn bounds(&self, cube: Cube) -> Aabb {
         let lo = DVec3::from_array(cube.lo.map(f64::from));
         let place = |p: DVec3| (self.lo + p / self.scale).as_vec3();
@@ -170,7 +169,7 @@ impl Lattice {
         (z as usize * self.dims[1] as usize + y as usize) * self.dims[0] as usize + x as usize
     }
 
-    /// Top cell of an index.
+    /// Coordinates of the top cell with a given index.
     pub fn top_cell(&self, index: usize) -> [u32; 3] {
         let (nx, ny) = (self.dims[0] as usize, self.dims[1] as usize);
         #[expect(clippy::cast_possible_truncation, reason = "remainders and quotients below the dims")]
@@ -183,7 +182,7 @@ impl Lattice {
     }
 }
 
-/// Box of bounded prim `prim`, its face thickened along its normal.
+/// Box of bounded prim `prim`, with a face thickened along its normal.
 pub fn thick_box(shapes: &Shapes, prim: u32, thickness: f64) -> (DVec3, DVec3) {
     let bounds = shapes.bounds(prim);
     let (lo, hi) = (bounds.lo.as_dvec3(), bounds.hi.as_dvec3());
@@ -199,7 +198,7 @@ pub fn thick_box(shapes: &Shapes, prim: u32, thickness: f64) -> (DVec3, DVec3) {
     (lo - more, hi + more)
 }
 
-/// Cells on each axis for the density that is asked for.
+/// Number of cells on each axis for the wanted density.
 fn dims(shapes: &Shapes, params: &GridParams, extent: DVec3) -> [u32; 3] {
     let longest = extent.max_element();
     let sizes = Sizes::of(shapes);
@@ -210,7 +209,7 @@ fn dims(shapes: &Shapes, params: &GridParams, extent: DVec3) -> [u32; 3] {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 1..=1024 before")]
         (extent * cube_root * factor).to_array().map(|n| n.round().clamp(1.0, most) as u32)
     };
-    // Large overlapping prims are listed in many cells each: then the cells must be larger.
+    // Large overlapping prims are listed in many cells each: the cells are enlarged until the lists fit.
     let most_references = f64::from(shapes.bounded()) * TOP_REFERENCES;
     let mut factor = 1.0;
     let mut dims = resolution(factor);
@@ -222,13 +221,13 @@ fn dims(shapes: &Shapes, params: &GridParams, extent: DVec3) -> [u32; 3] {
     dims
 }
 
-/// Sums over the boxes of all prims, from which the references of any resolution follow at once.
+/// Sums over the boxes of all prims, from which the references at any resolution follow directly.
 #[derive(Default)]
 struct Sizes {
     prims: f64,
-    /// Sum of the sides.
+    /// Sum of the side lengths.
     sides: DVec3,
-    /// Sum of the areas of the faces across each axis.
+    /// Sum of the areas of the faces perpendicular to each axis.
     faces: DVec3,
 }
 
@@ -241,7 +240,8 @@ impl Sizes {
         })
     }
 
-    /// A surface of a × b × c cells meets about 1 + (a + b + c) + (a b + b c + c a)/2 of them.
+    /// Estimated number of references. A surface of a × b × c cells overlaps about 1 + (a + b + c) + (a b + b c + c a)/2 of
+    /// them.
     fn references(&self, dims: [u32; 3], extent: DVec3) -> f64 {
         let per_length = DVec3::from_array(dims.map(f64::from)) / extent;
         let faces = self.faces.dot(per_length.yzx() * per_length.zxy());
@@ -249,23 +249,23 @@ impl Sizes {
     }
 }
 
-/// A cube of finest cells.
+/// Cube of finest cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cube {
     /// Smallest corner.
     pub lo: [u32; 3],
-    /// log2 of the side.
+    /// log2 of the side length.
     pub level: u32,
 }
 
 impl Cube {
-    /// The eighth `octant` (bit k set: the upper half on axis k).
+    /// Returns octant `octant` (bit k set: the upper half on axis k).
     pub fn octant(self, octant: u32) -> Self {
         let level = self.level - 1;
         Self { lo: [0, 1, 2].map(|k| self.lo[k] + ((octant >> k & 1) << level)), level }
     }
 
-    /// Side in finest cells.
+    /// Side length, in finest cells.
     pub fn side(self) -> f64 {
         f64::from(1u32 << self.level)
     }

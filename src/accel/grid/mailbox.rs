@@ -1,20 +1,20 @@
-//! What a ray remembers of the prims it met, so that a prim listed in several cells is tested once.
+//! Mailboxes: a ray's memory of tested prims, so that a prim listed in several cells is tested once.
 //!
-//! After J. Amanatides, A. Woo, 1987, and B. Arnaldi, T. Priol, K. Bouatouch, 1987; the memory belongs to the worker, not
-//! to the prim, so that threads do not meet.
+//! After J. Amanatides, A. Woo, 1987, and B. Arnaldi, T. Priol, K. Bouatouch, 1987; the memory belongs to the worker, not to
+//! the prim, so that threads do not interfere.
 
 use crate::accel::NO_PRIM;
 use crate::named::names;
 
-/// The choice of a [`Mailbox`].
+/// Choice of the [`Mailbox`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum MailboxKind {
-    /// Nothing is remembered.
+    /// No mailbox.
     None,
-    /// [`Stamps`].
+    /// One stamp per prim, [`Stamps`].
     #[default]
     Exact,
-    /// [`Hashed`].
+    /// A small hash table, [`Hashed`].
     Hashed,
 }
 
@@ -25,11 +25,11 @@ names!(MailboxKind, "mailbox", None => "none", Exact => "exact", Hashed => "hash
 /// Answering "first visit" too often only wastes a test. Answering "seen" for a prim that this ray has not met loses a
 /// hit, and no kind may do it.
 pub trait Mailbox: Send {
-    /// For prims `0..prims`. `kind` is for one that can be any.
+    /// Creates a mailbox for prims `0..prims`. Only [`AnyMailbox`] looks at `kind`.
     fn new(kind: MailboxKind, prims: u32) -> Self;
-    /// Forgets everything.
+    /// Forgets all prims, for the next ray.
     fn next_ray(&mut self);
-    /// Whether the current ray meets `prim` for the first time, as far as is known.
+    /// Whether the current ray meets `prim` for the first time, as far as the mailbox remembers.
     fn first_visit(&mut self, prim: u32) -> bool;
 }
 
@@ -60,11 +60,11 @@ impl Mailbox for Stamps {
     }
 }
 
-/// Places of [`Hashed`].
+/// Number of slots of [`Hashed`].
 const PLACES: usize = 64;
 
-/// A few places, one for each remainder of the prim's number: what comes later pushes out what was there. It forgets, but
-/// it takes no memory per prim. (I. Wald, *Realtime Ray Tracing and Interactive Global Illumination*, 2004; C. Benthin,
+/// A few slots, indexed by the prim's number modulo their count; a later prim replaces an earlier one. Forgets prims, but
+/// takes no memory per prim. (I. Wald, *Realtime Ray Tracing and Interactive Global Illumination*, 2004; C. Benthin,
 /// *Realtime Ray Tracing on Current CPU Architectures*, 2006.)
 #[derive(Clone, Debug)]
 pub struct Hashed {
@@ -87,15 +87,15 @@ impl Mailbox for Hashed {
     }
 }
 
-/// Any of them, looked up at every visit.
+/// Mailbox of any kind, dispatched at every visit.
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one for each worker")]
 pub enum AnyMailbox {
-    /// Nothing is remembered.
+    /// No memory: every visit counts as the first.
     None,
-    /// Exact.
+    /// One stamp per prim.
     Exact(Stamps),
-    /// Small.
+    /// A small hash table.
     Hashed(Hashed),
 }
 

@@ -1,5 +1,5 @@
-//! Each margin of building and walking is needed: with the derived ones every answer is that of brute force, and without
-//! any one of them some are not.
+//! Tests that each margin of building and walking is needed: with the derived margins every answer equals brute force, and
+//! without any one of them some answers do not.
 
 use super::lattice::CellMargins;
 use super::{GridOctree, GridParams};
@@ -25,23 +25,23 @@ fn wrong_with(margins: CellMargins, params: &GridParams, shapes: &Shapes, rays: 
     wrong(&<GridOctree>::build_within(shapes, params, margins), shapes, rays)
 }
 
-/// Nothing is wrong with the derived margins, something is with the others.
+/// Asserts that the derived margins lose nothing and the shrunk ones do.
 fn assert_needed(name: &str, shrunk: CellMargins, params: &GridParams, shapes: &Shapes, rays: &[Ray]) {
     assert_eq!(wrong_with(DERIVED, params, shapes, rays), 0, "{name} as derived");
     assert!(wrong_with(shrunk, params, shapes, rays) > 0, "{name}: nothing goes wrong with {shrunk:?}");
 }
 
-/// Width of the cells of [`EIGHT`] over a content of size 1.
+/// Width of the cells of [`EIGHT`] over content of size 1.
 ///
-/// It and the grid's beginning at −1/256, and so the planes between cells, are exact in `f32`, while the scale is not.
+/// The width and the grid's start at −1/256, and so the planes between cells, are exact in `f32`, while the scale is not.
 pub(in crate::accel) const WIDTH: f32 = 129.0 / 1024.0;
 
-/// The plane before cell `k` of [`EIGHT`] over the unit cube.
+/// Position of the plane before cell `k` of [`EIGHT`] over the unit cube.
 pub(in crate::accel) fn plane(k: usize) -> f32 {
     k as f32 * WIDTH - 1.0 / 256.0
 }
 
-/// Faces in the planes between the cells of [`EIGHT`], and rays along diagonals of these planes through the cells' corners.
+/// Faces in the planes between the cells of [`EIGHT`], and rays along the diagonals of these planes through cell corners.
 pub(in crate::accel) fn faces_between_cells() -> (Shapes, Vec<Ray>) {
     let mut r = Random::new(13);
     let corner = |r: &mut Random| Vec3::from_array([0, 1, 2].map(|_| plane(1 + r.below(7))));
@@ -82,7 +82,7 @@ fn a_zero_in_a_direction_that_stays_zero_loses_what_lies_in_the_planes_of_cells(
     assert_needed("no slope", CellMargins { no_slope: 0.0, ..DERIVED }, &EIGHT, &shapes, &rays);
 }
 
-/// A grid exactly as large as its content is missed by rays that only touch it.
+/// Rays that only touch a grid exactly as large as its content miss it.
 #[test]
 fn without_room_around_the_content_rays_through_its_corners_miss_it() {
     let mut r = Random::new(14);
@@ -100,7 +100,7 @@ fn without_room_around_the_content_rays_through_its_corners_miss_it() {
     assert_needed("room", CellMargins { room: 0.0, ..DERIVED }, &GridParams::DEFAULT, &shapes, &rays);
 }
 
-/// Seen from so far that one float of t spans many cells, hits in several of them are equally near.
+/// From so far away that one ulp of t spans many cells, hits in several of them are equally near.
 #[test]
 fn a_walk_that_stops_at_the_best_hit_or_before_it_misses_others_as_near() {
     let shapes = soup(700, 0.4);
@@ -110,21 +110,21 @@ fn a_walk_that_stops_at_the_best_hit_or_before_it_misses_others_as_near() {
     assert_needed("0.1 % early", CellMargins { lag: -0.001, ..DERIVED }, &GridParams::DEFAULT, &shapes, &near);
 }
 
-/// Where an ulp is no fraction of a distance.
+/// Distances so small that an ulp is no fraction of them.
 #[test]
 fn a_walk_through_the_smallest_numbers_misses_hits_that_are_as_near() {
     let shapes = moved(soup(700, 0.4), 1e-20, Vec3::ZERO);
     let mut r = Random::new(17);
     let mut aim = || {
         let origin = r.direction() * 3e-20;
-        // So fast that all of the scene lies within a few of the smallest distances.
+        // Directions so long that the whole scene lies within a few of the smallest distances.
         ray(origin, (r.cube() * 1e-20 - origin) * 1e30 * [1e13, 1e14][r.below(2)])
     };
     let rays: Vec<Ray> = (0..8000).map(|_| aim()).collect();
     assert_needed("underflow", CellMargins { underflow: 0.0, ..DERIVED }, &GridParams::DEFAULT, &shapes, &rays);
 }
 
-/// From 2^60 lengths away not even `f64` knows the cells that a ray passes.
+/// From 2^60 lengths away not even `f64` resolves the cells that a ray passes.
 #[test]
 fn rays_from_very_far_away_are_not_led_through_cells() {
     let shapes = soup(700, 0.4);
@@ -144,7 +144,7 @@ fn rays_from_very_far_away_are_not_led_through_cells() {
     );
 }
 
-/// Counts steps, and gives up.
+/// Probe that panics after 5000 steps.
 #[derive(Default)]
 struct Patience(u32);
 
@@ -155,7 +155,7 @@ impl Probe for Patience {
     }
 }
 
-/// Through an octree of eight finest cells on each axis.
+/// Walks the rays through an octree of eight finest cells on each axis.
 fn walk_octants(guarded: bool) {
     let (shapes, rays) = faces_between_cells();
     let params = GridParams { max_resolution: 1, max_depth: 3, step_cost: 0.1, ..EIGHT };

@@ -1,10 +1,9 @@
 //! Uniform grid whose crowded cells are refined by octrees, with a per-ray mailbox.
 //!
-//! A grid of cells as near to cubes as possible lies over the shapes ([`lattice`]); every cell lists the prims whose
-//! surface touches it, padded ([`overlap`], `build`). Where a list is so long that smaller cells are expected to pay, the
-//! cell becomes an octree (`octree`), or is given a hierarchy of boxes (`trees`). A ray visits cells in order and stops
-//! behind the first hit that nothing can precede (`walk`); the mailbox saves repeated tests of prims listed in several
-//! cells ([`mailbox`]).
+//! A grid of nearly cubic cells covers the shapes ([`lattice`]); every cell, padded, lists the prims whose surface overlaps
+//! it ([`overlap`], `build`). Where a list is so long that smaller cells are expected to pay, the cell becomes an octree
+//! (`octree`) or gets a hierarchy of boxes (`trees`). A ray visits cells in order and stops behind the first hit that no
+//! other can precede (`walk`); the mailbox saves repeated tests of prims listed in several cells ([`mailbox`]).
 
 mod build;
 mod check;
@@ -33,15 +32,15 @@ use super::{Probe, Shapes};
 /// Marks an entry that is an octree node; the other bits are its index.
 const NODE: u32 = 1 << 31;
 
-/// The cell that lists nothing.
+/// Index of the cell with an empty list.
 const EMPTY: u32 = 0;
 
-/// The grid. `M` is the kind of mailbox.
+/// Uniform grid with refined cells. `M` is the kind of mailbox.
 #[derive(Clone, Debug)]
 pub struct GridOctree<'a, M = AnyMailbox> {
     shapes: &'a Shapes,
     lattice: Lattice,
-    /// One entry for each top cell: a cell, or an octree's root marked [`NODE`].
+    /// One entry per top cell: the index of a cell, or an octree's root marked [`NODE`].
     top: Vec<u32>,
     cells: Cells,
     trees: Trees,
@@ -50,23 +49,23 @@ pub struct GridOctree<'a, M = AnyMailbox> {
 }
 
 impl<'a, M: Mailbox> GridOctree<'a, M> {
-    /// Builds it over the bounded prims; the same for every number of threads.
+    /// Builds the grid over the bounded prims; the same for every number of threads.
     pub fn build(shapes: &'a Shapes, params: &GridParams) -> Self {
         let margins = match params.assign {
             Assign::Surface => CellMargins::DERIVED,
-            // Figures that are compared with published ones must not count prims that only touch the padding.
+            // Figures that are compared with published ones must not count prims that overlap the padding alone.
             Assign::Box => CellMargins::NEAR,
         };
         Self::build_within(shapes, params, margins)
     }
 
-    /// With another mailbox than the exact one.
+    /// Sets the kind of mailbox; the default is the exact one.
     #[must_use]
     pub fn with_mailbox(self, mailbox: MailboxKind) -> Self {
         Self { mailbox, ..self }
     }
 
-    /// [`Self::build`] by given margins.
+    /// [`Self::build`] with given margins.
     pub(super) fn build_within(shapes: &'a Shapes, params: &GridParams, margins: CellMargins) -> Self {
         let lattice = Lattice::new(shapes, params, margins);
         let (top, cells) = build::build(shapes, &lattice, params);
@@ -82,10 +81,10 @@ impl<'a, M: Mailbox> GridOctree<'a, M> {
     }
 }
 
-/// What a walk through cells writes to.
+/// Scratch memory of a walk through cells.
 #[derive(Clone, Debug)]
 pub struct GridScratch<M> {
-    /// What the ray remembers.
+    /// Prims that the current ray has met.
     pub mailbox: M,
     stack: Stack,
 }

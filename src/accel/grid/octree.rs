@@ -6,28 +6,28 @@ use super::{EMPTY, GridParams, NODE};
 use crate::accel::Shapes;
 use crate::math::DVec3;
 
-/// References that even a scene of few prims may have, beside [`GridParams::references`] for each prim.
+/// Number of references allowed in any scene, in addition to [`GridParams::references`] per prim.
 const FREE_REFERENCES: f64 = 1024.0;
 
-/// All cells with their lists, and the octree nodes between the top grid and them.
+/// All cells with their lists, and the octree nodes between them and the top grid.
 #[derive(Clone, Debug)]
 pub(super) struct Cells {
-    /// The eight entries of each node: another node, marked [`NODE`], or a cell.
+    /// Eight entries per node: another node, marked [`NODE`], or a cell.
     pub nodes: Vec<[u32; 8]>,
-    /// First reference of each cell, and one past the last.
+    /// Index of the first reference of each cell, and one past the last.
     first: Vec<u32>,
-    /// Prims, ascending within a cell.
+    /// Listed prims, ascending within a cell.
     pub refs: Vec<u32>,
 }
 
-/// Where a part's nodes and cells went when it was appended.
+/// Offsets by which a part's nodes and cells moved when it was appended.
 pub(super) struct Moved {
     node: u32,
     cell: u32,
 }
 
 impl Moved {
-    /// An entry of the part as one of the whole.
+    /// Translates an entry of the part into one of the whole.
     pub(super) fn entry(&self, entry: u32) -> u32 {
         match entry {
             EMPTY => EMPTY,
@@ -38,23 +38,23 @@ impl Moved {
 }
 
 impl Cells {
-    /// Only the empty cell.
+    /// Creates the arrays with the empty cell alone.
     pub(super) fn new() -> Self {
         Self { nodes: Vec::new(), first: vec![0, 0], refs: Vec::new() }
     }
 
-    /// The prims of a cell.
+    /// Prims listed in a cell.
     #[inline]
     pub(super) fn list(&self, cell: u32) -> &[u32] {
         &self.refs[self.first[cell as usize] as usize..self.first[cell as usize + 1] as usize]
     }
 
-    /// Number of different cells; all empty ones are cell 0.
+    /// Number of distinct cells; all empty ones are cell 0.
     pub(super) fn len(&self) -> usize {
         self.first.len() - 1
     }
 
-    /// Bytes of the arrays.
+    /// Size of the arrays, in bytes.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.nodes) + size_of_val(&*self.first) + size_of_val(&*self.refs)
     }
@@ -69,7 +69,7 @@ impl Cells {
         index(self.len() - 1)
     }
 
-    /// Adds what another builder made.
+    /// Appends the cells and nodes of another builder.
     pub(super) fn append(&mut self, part: Self) -> Moved {
         let moved = Moved { node: index(self.nodes.len()), cell: index(self.len() - 1) };
         let refs = index(self.refs.len());
@@ -80,13 +80,13 @@ impl Cells {
     }
 }
 
-/// Turns lists of top cells into cells or octrees.
+/// Turns the lists of top cells into cells or octrees.
 pub(super) struct Refiner<'a> {
     shapes: &'a Shapes,
     lattice: &'a Lattice,
     step_cost: f64,
     leaf_size: Option<u32>,
-    /// How much the number of references may grow below the top cells.
+    /// Factor by which the number of references may grow below the top cells.
     growth: f64,
     cells: Cells,
 }
@@ -102,7 +102,7 @@ impl<'a> Refiner<'a> {
         self.cells
     }
 
-    /// The entry for a top cell with these prims.
+    /// Adds a top cell that lists these prims, split if that pays, and returns its entry.
     pub(super) fn cell(&mut self, cube: Cube, prims: &[u32]) -> u32 {
         if cube.level == 0 || !self.could_pay(prims.len()) {
             return self.cells.push_cell(prims.iter().copied());
@@ -112,10 +112,10 @@ impl<'a> Refiner<'a> {
         self.split(cube, &members, self.growth, &Crowd { prims, overlaps: &overlaps })
     }
 
-    /// Splits the cube if that is expected to pay, and each octant in turn.
+    /// Splits the cube if that is expected to pay, and each octant in turn; returns the entry.
     ///
-    /// `growth` is how many references the cell may turn into for each that it has. A split uses it up by as much as it
-    /// lists prims more often, on every path alike; so prims that no split can part end in one list, not in millions.
+    /// `growth` is the number of references the cell may turn into, per reference it has. A split divides it by its own
+    /// growth of the lists, the same on every path; so prims that no split can separate end in one list, not in millions.
     fn split(&mut self, cube: Cube, members: &[u32], growth: f64, crowd: &Crowd) -> u32 {
         let leaf = |cells: &mut Cells| cells.push_cell(members.iter().map(|&m| crowd.prims[m as usize]));
         if cube.level == 0 || !self.could_pay(members.len()) {
@@ -139,9 +139,10 @@ impl<'a> Refiner<'a> {
         index(node) | NODE
     }
 
-    /// A ray through a cube meets each octant with probability 1/4 (the ratio of their surfaces): expected cost of the
-    /// octants against that of the whole. It also ends splitting where octants keep nearly all prims. With a leaf size,
-    /// being more than that is reason enough (A. Glassner, *Space Subdivision for Fast Ray Tracing*, 1984).
+    /// Whether splitting a cell of `prims` prims into octants with `listed` references pays. A ray through a cube meets each
+    /// octant with probability 1/4 (the ratio of their surfaces), which gives the expected cost of the octants against that
+    /// of the whole. The test also ends splitting where octants keep nearly all prims. With a leaf size, exceeding it is
+    /// reason enough (A. Glassner, *Space Subdivision for Fast Ray Tracing*, 1984).
     fn pays(&self, prims: usize, listed: u32) -> bool {
         if let Some(leaf_size) = self.leaf_size {
             return prims > leaf_size as usize;
@@ -155,20 +156,20 @@ impl<'a> Refiner<'a> {
     }
 }
 
-/// The prims of one top cell.
+/// Prims of one top cell.
 struct Crowd<'a> {
     prims: &'a [u32],
     overlaps: &'a [Overlap],
 }
 
 impl Crowd<'_> {
-    /// One bit for each octant of the cube that member `m` belongs to.
+    /// Bit mask of the octants of the cube that member `m` overlaps.
     fn octants(&self, m: u32, cube: Cube) -> u8 {
         let overlap = &self.overlaps[m as usize];
         let half = cube.octant(7).lo;
         let middle = DVec3::new(f64::from(half[0]), f64::from(half[1]), f64::from(half[2]));
 
-        // Most prims are small: their box meets one octant or two.
+        // Most prims are small: their boxes overlap one octant or two.
         let (below, above) = (overlap.lo.cmple(middle).bitmask(), middle.cmple(overlap.hi).bitmask());
         let meets = |axis: usize, lower: u8| {
             (if below >> axis & 1 == 1 { lower } else { 0 }) | (if above >> axis & 1 == 1 { !lower } else { 0 })

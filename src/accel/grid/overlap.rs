@@ -1,12 +1,12 @@
-//! Which cells a prim belongs to: exact overlap of its surface with a padded cube, in `f64`.
+//! Assignment of prims to cells: exact overlap of a prim's surface with a padded cube, in `f64`.
 //!
-//! For triangles after M. Schwarz, H.-P. Seidel, *Fast Parallel Surface and Solid Voxelization on GPUs*, 2010: the box of
-//! the triangle, its plane, and its three edges in each of the three projections; the same answer as the separating axes
-//! of T. Akenine-Möller, 2001, but with all that depends on the triangle alone computed once.
+//! For triangles after M. Schwarz, H.-P. Seidel, *Fast Parallel Surface and Solid Voxelization on GPUs*, 2010: the box of the
+//! triangle, its plane, and its three edges in each of the three projections. The answer equals that of the separating axes
+//! of T. Akenine-Möller, 2001, but all that depends on the triangle alone is computed once.
 //!
-//! Every comparison is in favour of overlap by the padding of [`CellMargins`](super::lattice::CellMargins). Rounding
-//! here is far below that: points and edge values err by at most 2⁻⁴⁸ R cells; only a plane's normal may err more, and
-//! has its own slack.
+//! Every comparison errs towards overlap, by the padding of [`CellMargins`](super::lattice::CellMargins). Rounding here is
+//! far below that: points and edge values err by at most 2⁻⁴⁸ R cells; only a plane's normal may err more, and has its own
+//! slack.
 
 use super::lattice::{Cube, Lattice, thick_box};
 use super::params::Assign;
@@ -16,13 +16,13 @@ use crate::math::bounds::U64;
 use crate::math::cone::{Cone, Profile};
 use crate::math::polygon::Polygon;
 
-/// A prim ready to be compared with cubes.
+/// A prim prepared for overlap tests with cubes.
 #[derive(Clone, Debug)]
 pub struct Overlap {
     pad: f64,
-    /// Box of the prim in finest cells, padded.
+    /// Lower corner of the prim's padded box, in finest cells.
     pub lo: DVec3,
-    /// Its upper corner.
+    /// Upper corner of the box.
     pub hi: DVec3,
     surface: Surface,
 }
@@ -47,7 +47,7 @@ enum Surface {
         profile: Profile,
         cell: DVec3,
     },
-    /// Its box will do.
+    /// Any other surface: its box decides.
     Unknown,
 }
 
@@ -67,12 +67,12 @@ impl Overlap {
         Self { pad, lo, hi, surface }
     }
 
-    /// Whether the prim's surface meets the cube, padded.
+    /// Whether the prim's surface overlaps the padded cube.
     pub fn test(&self, cube: Cube) -> bool {
         let lo = DVec3::new(f64::from(cube.lo[0]), f64::from(cube.lo[1]), f64::from(cube.lo[2]));
         let side = cube.side();
         let hi = lo + side;
-        // A prim inside the cube meets it: most do, and need no more.
+        // A prim whose box is inside the cube overlaps it: most are, and need no further test.
         let inside = lo.cmple(self.lo).all() && self.hi.cmple(hi).all();
         let apart = !(self.lo.cmple(hi).all() && lo.cmple(self.hi).all());
         inside || (!apart && self.surface_meets(lo - self.pad, side + 2.0 * self.pad))
@@ -84,16 +84,16 @@ impl Overlap {
             Surface::Triangle { plane, edges } => plane.meets(lo, side) && edges.iter().all(|e| e.meets(lo, side)),
             Surface::Polygon { plane } => plane.meets(lo, side),
             Surface::Sphere { center, radius, cell } => {
-                // In units of length: cells need not be cubes.
+                // In units of length, because cells need not be cubes.
                 let (lo, hi) = (lo * *cell - *center, (lo + side) * *cell - *center);
                 let nearest = lo.max(-hi).max(DVec3::ZERO).length();
                 let farthest = lo.abs().max(hi.abs()).length();
                 nearest <= *radius && *radius <= farthest
             }
             Surface::Cone { base, profile, cell } => {
-                // The ball around the cube, in units of length: no corner is further from the middle. Its slack of 2⁻²⁰
-                // of itself is far above the rounding of the distance, u of the cone's size: a finest cell is at least
-                // 2⁻²⁰ of that.
+                // Bounding sphere of the cube, in units of length: no corner is farther from the centre. Its slack of 2⁻²⁰ of
+                // the radius is far above the rounding of the distance, u of the cone's size, because a finest cell is at
+                // least 2⁻²⁰ of that.
                 let half = *cell * (side * 0.5);
                 let middle = lo * *cell + half - *base;
                 let s = middle.dot(profile.axis);
@@ -105,19 +105,19 @@ impl Overlap {
     }
 }
 
-/// Box of bounded prim `prim` in finest cells, padded: lower and upper corner.
+/// Padded box of bounded prim `prim` in finest cells: lower and upper corner.
 pub fn padded_box(shapes: &Shapes, prim: u32, lattice: &Lattice) -> (DVec3, DVec3) {
     let ((lo, hi), pad) = (thick_box(shapes, prim, lattice.thickness), lattice.margins.pad);
     (lattice.place_f64(lo) - pad, lattice.place_f64(hi) + pad)
 }
 
-/// All points between two parallel planes.
+/// Space between two parallel planes.
 #[derive(Clone, Copy, Debug, Default)]
 struct Slab {
     normal: DVec3,
-    /// normal · p of the points on the middle plane.
+    /// normal · p for points p on the middle plane.
     offset: f64,
-    /// How far normal · p may be from that.
+    /// Largest deviation of normal · p from `offset`.
     slack: f64,
 }
 
@@ -130,7 +130,7 @@ impl Slab {
     }
 }
 
-/// The half plane on the inner side of one edge, in the projection along one axis.
+/// Half plane on the inner side of an edge, in the projection along one axis.
 #[derive(Clone, Copy, Debug, Default)]
 struct Edge {
     normal: DVec3,
@@ -138,7 +138,7 @@ struct Edge {
 }
 
 impl Edge {
-    /// Nothing is beyond it.
+    /// Accepts every cube.
     const NONE: Self = Self { normal: DVec3::ZERO, offset: 0.0 };
 
     fn meets(&self, lo: DVec3, side: f64) -> bool {
@@ -149,7 +149,7 @@ impl Edge {
 fn triangle([a, b, c]: [DVec3; 3], lattice: &Lattice) -> Surface {
     let (ab, bc, ca) = (b - a, c - b, a - c);
     let normal = ab.cross(bc);
-    // What rounding can do to each component of the normal: two products of rounded differences.
+    // Rounding error of each component of the normal: two products of rounded differences.
     let (p, q) = (ab.abs(), bc.abs());
     let sizes = DVec3::new(p.y * q.z + p.z * q.y, p.z * q.x + p.x * q.z, p.x * q.y + p.y * q.x);
     let doubt = sizes * (8.0 * U64);
@@ -157,7 +157,7 @@ fn triangle([a, b, c]: [DVec3; 3], lattice: &Lattice) -> Surface {
 
     let mut edges = [Edge::NONE; 9];
     for axis in 0..3 {
-        // Seen edge-on the inner side is not known; the plane then is the better test anyway.
+        // In an edge-on projection the inner side is unknown; the plane is the better test there anyway.
         if normal[axis].abs() <= doubt[axis] {
             continue;
         }
@@ -171,10 +171,10 @@ fn triangle([a, b, c]: [DVec3; 3], lattice: &Lattice) -> Surface {
     Surface::Triangle { plane, edges }
 }
 
-/// The slab around Newell's plane that holds all corners, and so every hit: where a grazing hit is moved into the
-/// polygon's box, the ray runs inside the slab.
+/// Slab around Newell's plane that contains all corners, and so every hit: where a grazing hit is moved into the polygon's
+/// box, the ray runs inside the slab.
 fn polygon(polygon: Polygon, lattice: &Lattice) -> Surface {
-    // Normals go to the lattice by the inverse of the scale.
+    // Normals transform into lattice units by the inverse of the scale.
     let normal = (polygon.newell() / lattice.scale).normalize_or_zero();
     let first = polygon.points().next().map_or(DVec3::ZERO, |p| lattice.place(p));
     let deviation = polygon.points().map(|p| normal.dot(lattice.place(p) - first).abs()).fold(0.0, f64::max);
@@ -192,7 +192,7 @@ fn cone(c: &Cone, lattice: &Lattice) -> Surface {
     Surface::Cone { base, profile: Profile::new(c), cell: lattice.scale.recip() }
 }
 
-/// Finest cells across the grid on its longest axis.
+/// Number of finest cells along the grid's longest axis.
 fn across(lattice: &Lattice) -> f64 {
     let [x, y, z] = lattice.fine_dims();
     f64::from(x.max(y).max(z))

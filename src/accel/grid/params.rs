@@ -1,41 +1,41 @@
-//! How fine the grid and its octrees are.
+//! Resolution and depth of the grid and its octrees.
 
 use crate::named::names;
 
-/// Parameters of [`GridOctree`](super::GridOctree), all settled; the default suits meshes.
+/// Parameters of [`GridOctree`](super::GridOctree); the default suits meshes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridParams {
     /// Cells of the top grid per prim, more than 0 and at most 64. (J. Cleary, G. Wyvill, 1988: the resolution follows
     /// from density × number of prims, cells as near to cubes as possible.)
     pub density: f64,
-    /// Most cells along one axis of the top grid, 1 to 1024.
+    /// Largest number of cells along one axis of the top grid, 1 to 1024.
     pub max_resolution: u32,
-    /// Most levels of an octree below a top cell, 0 to 10; 0: a plain uniform grid.
+    /// Largest number of octree levels below a top cell, 0 to 10; 0: a plain uniform grid.
     pub max_depth: u32,
-    /// Cost of visiting a cell in prim tests, 0.1 to 100: a cell is split when that is expected to pay.
+    /// Cost of visiting a cell, in prim tests, 0.1 to 100: a cell is split when that is expected to pay.
     pub step_cost: f64,
-    /// Instead of the step cost: every cell that lists more prims is split, as deep as `max_depth` and `references` allow.
+    /// Replaces the step cost: every cell that lists more prims is split, as deep as `max_depth` and `references` allow.
     pub leaf_size: Option<u32>,
-    /// Cells of the top grid on each axis, 1 to 1024 and at most [`MOST_CELLS`] in all, whatever the density; `None`:
-    /// what density and resolution say.
+    /// Cells of the top grid on each axis, 1 to 1024 and at most [`MOST_CELLS`] in all, whatever the density; `None`: derived
+    /// from density and resolution.
     pub dims: Option<[u32; 3]>,
-    /// References there may be for each prim in the cells of all octrees together, 1 to 1000.
+    /// Largest number of references per prim in the cells of all octrees together, 1 to 1000.
     pub references: f64,
-    /// What decides that a prim is listed in a cell.
+    /// Rule that assigns prims to cells.
     pub assign: Assign,
-    /// How far the boxes of faces reach beyond them along their normals, in the shapes' units, 0 to 10⁶. For
-    /// [`Assign::Box`]: programs were published whose boxes did.
+    /// Distance by which the boxes of faces extend beyond them along their normals, in the shapes' units, 0 to 10⁶. For
+    /// [`Assign::Box`]: published programs had such boxes.
     pub thickness: f64,
 }
 
-/// What decides that a prim is listed in a cell.
+/// Rule that assigns prims to cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Assign {
-    /// Its surface meets the cell.
+    /// A prim is listed where its surface overlaps the cell.
     #[default]
     Surface,
-    /// Its box meets the cell: sooner built, but more is listed. What programs of the 1980s and 1990s did, and what their
-    /// published figures count.
+    /// A prim is listed where its box overlaps the cell: faster to build, but with more references. Programs of the 1980s and
+    /// 1990s did so, and their published figures count it.
     Box,
 }
 
@@ -47,7 +47,7 @@ impl Default for GridParams {
     }
 }
 
-/// Cells of a top grid at most: lists of so many take a gigabyte and a half.
+/// Largest number of cells in a top grid: the lists of so many take a gigabyte and a half.
 pub const MOST_CELLS: f64 = (1_u32 << 27) as f64;
 
 /// A parameter out of its range.
@@ -60,7 +60,7 @@ pub struct ParamError {
 }
 
 impl GridParams {
-    /// What suits most meshes.
+    /// Parameters that suit most meshes.
     pub const DEFAULT: Self = Self {
         density: 0.25,
         max_resolution: 256,
@@ -73,13 +73,13 @@ impl GridParams {
         thickness: 0.0,
     };
 
-    /// A grid without octrees, which has to be finer.
+    /// A grid without octrees, which must be finer.
     pub const UNIFORM: Self = Self { density: 4.0, max_depth: 0, ..Self::DEFAULT };
 
     /// One cell that becomes an octree.
     pub const OCTREE: Self = Self { max_resolution: 1, max_depth: 10, ..Self::DEFAULT };
 
-    /// Whether every parameter is within its range.
+    /// Checks that every parameter is within its range.
     pub fn validate(&self) -> Result<(), ParamError> {
         let density = self.density;
         check("grid density", density, density > 0.0 && density <= 64.0, "more than 0 and at most 64")?;
@@ -97,7 +97,7 @@ impl GridParams {
     }
 }
 
-/// An error that names the parameter, unless it is all right.
+/// Returns an error that names the parameter, unless `ok`.
 pub(in crate::accel) fn check(name: &'static str, value: f64, ok: bool, range: &'static str) -> Result<(), ParamError> {
     ok.then_some(()).ok_or(ParamError { name, value, range })
 }

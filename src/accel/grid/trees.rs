@@ -1,7 +1,8 @@
 //! Hierarchies of boxes inside crowded cells.
 //!
-//! Each is a tree over what one cell lists, of boxes clipped to the cell: what a prim does outside is for the cells there to
-//! find. A ray is inside the padded cell wherever it is led through it, and the clipping keeps all of the padding.
+//! Each is a tree over the prims that one cell lists, with boxes clipped to the cell: the parts of a prim outside are found
+//! in their own cells. A ray stays inside the padded cell while it is led through it, and the clipping keeps the whole
+//! padding.
 
 use rayon::prelude::*;
 
@@ -13,25 +14,25 @@ use crate::accel::wide::split::Item;
 use crate::accel::{Shapes, StructureStats};
 use crate::math::aabb::Aabb;
 
-/// No tree in a cell.
+/// Marks a cell without a tree.
 const NOTHING: u32 = u32::MAX;
 
 /// The trees of all crowded cells.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trees {
-    /// Root of each cell's tree, or [`NOTHING`]; empty when there are none at all.
+    /// Root of each cell's tree, or [`NOTHING`]; empty when no cell has a tree.
     roots: Vec<u32>,
     pub tree: Tree,
 }
 
 impl Trees {
-    /// The root of a cell's tree.
+    /// Root of a cell's tree, if it has one.
     #[inline]
     pub(super) fn root(&self, cell: u32) -> Option<u32> {
         self.roots.get(cell as usize).copied().filter(|&root| root != NOTHING)
     }
 
-    /// Whether no cell has one.
+    /// Whether no cell has a tree.
     #[inline]
     pub(super) fn is_empty(&self) -> bool {
         self.roots.is_empty()
@@ -41,7 +42,7 @@ impl Trees {
         size_of_val(&*self.roots) + self.tree.bytes()
     }
 
-    /// Counts a cell's tree in place of the cell.
+    /// Counts the nodes of a cell's tree in place of the cell.
     pub(super) fn count(&self, cell: u32, stats: &mut StructureStats) {
         let Some(root) = self.root(cell) else { return };
         stats.n_v -= 1;
@@ -55,16 +56,16 @@ impl Trees {
     }
 }
 
-/// The box of a prim inside a cell.
+/// Box of the part of a prim inside a cell.
 fn clipped(shapes: &Shapes, prim: u32, cell: &Aabb) -> Aabb {
     let bounds = shapes.bounds(prim);
     let inside = bounds.intersection(*cell);
-    // The two may touch only by the rounding of the cell.
+    // Box and cell may touch only by the rounding of the cell.
     if inside.is_empty() { bounds } else { inside }
 }
 
 impl<M: Mailbox> GridOctree<'_, M> {
-    /// With a hierarchy, leaves of at most `leaf_size` prims, in each cell that lists more.
+    /// Adds a hierarchy, with leaves of at most `leaf_size` prims, to each cell that lists more.
     #[must_use]
     pub fn with_trees(mut self, leaf_size: u32) -> Self {
         let leaf_size = leaf_size as usize;
@@ -93,8 +94,8 @@ impl<M: Mailbox> GridOctree<'_, M> {
 }
 
 impl<M> GridOctree<'_, M> {
-    /// What is wrong with a cell's tree: its leaves hold what the cell lists, and every box what is below it inside the
-    /// cell.
+    /// Describes a fault of a cell's tree, if any: its leaves must hold the prims that the cell lists, and every box must
+    /// contain everything below it inside the cell.
     pub(super) fn tree_fault(&self, cube: Cube, cell: u32) -> Option<String> {
         let root = self.trees.root(cell)?;
         let bounds = self.lattice.padded_bounds(cube);

@@ -1,17 +1,17 @@
-//! The way of a ray through the cells.
+//! Traversal of the cells by a ray.
 //!
-//! The top grid is crossed by the 3D-DDA of J. Amanatides, A. Woo, *A Fast Voxel Traversal Algorithm for Ray Tracing*,
+//! The top grid is traversed by the 3D-DDA of J. Amanatides, A. Woo, *A Fast Voxel Traversal Algorithm for Ray Tracing*,
 //! 1987, with one change: the distance to the next plane is computed from the plane's integer each time and never
-//! accumulated, so that errors do not grow along the ray. Inside a refined cell the octants are visited in order along the
-//! ray without a stack: the next finest cell is known as an integer, and its octant is found from the top cell down.
+//! accumulated, so that errors do not grow along the ray. Inside a refined cell the octants are visited in ray order without
+//! a stack: the next finest cell is known as an integer, and its octant is found from the top cell down.
 //!
 //! # Why no hit is lost
-//! Exit distances split the ray into intervals; the cell visited in an interval holds the ray there up to the error of
-//! computing positions in `f64`, less than an eighth of [`CELL_PAD`](crate::math::bounds::CELL_PAD) for origins within
-//! [`RAY_CELLS`](crate::math::bounds::RAY_CELLS). Prims are listed in every cell that they touch within the padding, so
-//! a hit with exact distance t is tested at the latest in the cell of t's interval. The walk ends behind a cell when no
-//! later hit can come before the best one: when that lies, by [`WALK_MARGIN`](crate::math::bounds::WALK_MARGIN), before
-//! the exit. A hit found beyond the exit is kept but is not final.
+//! Exit distances split the ray into intervals; the cell visited in an interval contains the ray there up to the error of
+//! computing positions in `f64`, which is less than an eighth of [`CELL_PAD`](crate::math::bounds::CELL_PAD) for origins
+//! within [`RAY_CELLS`](crate::math::bounds::RAY_CELLS). Prims are listed in every cell that they overlap within the padding,
+//! so a hit with exact distance t is tested at the latest in the cell of t's interval. The walk ends behind a cell once no
+//! later hit can precede the best one, that is once the best hit lies before the exit by
+//! [`WALK_MARGIN`](crate::math::bounds::WALK_MARGIN). A hit found beyond the exit is kept but is not final.
 
 use super::lattice::{Cube, Lattice};
 use super::mailbox::Mailbox;
@@ -21,19 +21,19 @@ use crate::accel::probe::{Extent, NodeId, Visit};
 use crate::accel::query::{Goal, Query};
 use crate::accel::slabs::BoxRay;
 
-/// A ray in units of finest cells; t is the same as outside.
+/// A ray in units of finest cells, with t unchanged.
 struct Track {
     origin: [f64; 3],
     dir: [f64; 3],
     inv_dir: [f64; 3],
-    /// Whether it runs towards larger coordinates.
+    /// Whether the ray runs towards larger coordinates, per axis.
     forwards: [bool; 3],
-    /// For the hierarchies in cells, if there are any.
+    /// The ray for the box tests of hierarchies in cells, if there are any.
     boxes: Option<BoxRay>,
 }
 
 impl Track {
-    /// `None`: the origin is too far away to know the ray's cells.
+    /// Creates the track of a query's ray; `None` if its origin is too far away to resolve the ray's cells.
     fn new<G: Goal>(lattice: &Lattice, query: &Query<G>, boxes: bool) -> Option<Self> {
         let origin = lattice.place(query.ray.origin);
         let along = query.ray.dir.as_dvec3() * lattice.scale;
@@ -47,13 +47,13 @@ impl Track {
         })
     }
 
-    /// The distance to a plane between cells.
+    /// Distance to a plane between cells.
     #[inline]
     fn meets(&self, axis: usize, plane: u32) -> f64 {
         (f64::from(plane) - self.origin[axis]) * self.inv_dir[axis]
     }
 
-    /// Coordinate at distance t as a finest cell in `lo..=hi`.
+    /// Coordinate at distance t, as a finest cell in `lo..=hi`.
     #[inline]
     fn cell_at(&self, axis: usize, t: f64, lo: u32, hi: u32) -> u32 {
         let x = self.origin[axis] + self.dir[axis] * t;
@@ -61,7 +61,7 @@ impl Track {
         (x as u32).clamp(lo, hi)
     }
 
-    /// The part of `from..=to` inside the grid's box.
+    /// Part of `from..=to` inside the grid's box.
     fn span(&self, fine: [u32; 3], from: f64, to: f64) -> Option<(f64, f64)> {
         let (mut near, mut far) = (from, to);
         for (k, end) in fine.into_iter().enumerate() {
@@ -74,7 +74,7 @@ impl Track {
     }
 }
 
-/// The axis of the smallest of three distances, and that distance.
+/// Axis and value of the smallest of three distances.
 #[inline]
 fn first_exit(t: [f64; 3]) -> (usize, f64) {
     let axis = if t[0] < t[1] {
@@ -88,14 +88,14 @@ fn first_exit(t: [f64; 3]) -> (usize, f64) {
 }
 
 impl<M: Mailbox> GridOctree<'_, M> {
-    /// The distance up to which cells must be visited for hits within the query's reach.
+    /// Distance up to which cells must be visited for hits within the query's reach.
     #[inline]
     fn limit<G: Goal>(&self, query: &Query<G>) -> f64 {
         let reach = f64::from(query.reach());
         reach + self.lattice.margins.behind(reach)
     }
 
-    /// Visits the cells along the ray in order.
+    /// Visits the cells along the ray, in order.
     pub(super) fn walk_cells<G: Goal, P: Probe>(
         &self,
         query: &mut Query<G>,
@@ -159,7 +159,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
         }
     }
 
-    /// Visits the cells below one top cell; whether the query is answered.
+    /// Visits the cells below one top cell; returns whether the query is answered.
     #[expect(clippy::too_many_arguments, reason = "the state of the walk it is a part of")]
     fn walk_octants<G: Goal, P: Probe>(
         &self,
@@ -203,7 +203,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
                 return true;
             }
 
-            // Never back, so that the walk ends, and not out of the cell.
+            // Never step back, so that the walk ends, nor out of the cell.
             for k in 0..3 {
                 if k == axis {
                     continue;
@@ -225,7 +225,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
         }
     }
 
-    /// The cell that holds finest cell `at`, and its level.
+    /// Cell that contains finest cell `at`, and its level.
     #[inline]
     fn descend<P: Probe>(&self, root: u32, at: [u32; 3], probe: &mut P) -> (u32, u32) {
         let mut entry = root;
@@ -243,14 +243,14 @@ impl<M: Mailbox> GridOctree<'_, M> {
         (entry, level)
     }
 
-    /// A node, or a cell and what it lists; a hierarchy in it is told by itself.
+    /// Record of a visit to a node, or to a cell with its list; a hierarchy in the cell records its own.
     fn told(&self, place: NodeId, cube: Cube, cell: Option<u32>) -> Visit {
         let listed =
             cell.filter(|&cell| self.trees.root(cell).is_none()).map(|cell| self.cells.list(cell).len() as u32);
         Visit { place, extent: Extent::Box(self.lattice.bounds(cube)), listed }
     }
 
-    /// Tests the prims of a cell that has some; whether the query is answered.
+    /// Tests the prims of a non-empty cell; returns whether the query is answered.
     #[inline]
     fn visit<G: Goal, P: Probe>(
         &self,

@@ -1,4 +1,4 @@
-//! The structure of two levels: a tree for each object, and one over the places where they stand.
+//! Two-level structure: a tree for each object, and one over the places of objects.
 
 use super::{InstancedObjects, PlacedObject, PrimLocation};
 use crate::accel::bvh::tree::{Below, Stack as PlaceStack, Tree as PlaceTree};
@@ -14,22 +14,22 @@ use crate::accel::{
 use crate::math::aabb::Aabb;
 use rayon::prelude::*;
 
-/// Two levels: shapes that are not instanced in one tree, each object in one of its own, and a hierarchy of boxes over the
+/// Two-level structure: one tree over the shapes that are not instanced, one per object, and a hierarchy of boxes over the
 /// places of objects.
 ///
-/// Prims have the numbers of the flattened scene, in rays and in hits.
+/// Prims are numbered as in the flattened scene, in rays and in hits.
 #[derive(Clone, Debug)]
 pub struct TwoLevel<'a> {
     instanced: &'a InstancedObjects,
-    /// Over shapes that are not instanced.
+    /// Tree over the shapes that are not instanced.
     stored: Wide<'a>,
-    /// Over each object, in its own frame.
+    /// One tree per object, in the object's own frame.
     objects: Vec<Wide<'a>>,
-    /// Over the places, by their numbers. Its root is node 0; there is none without places.
+    /// Tree over the places, by index. Its root is node 0; there is none without places.
     places: PlaceTree,
 }
 
-/// What walks through both levels write to.
+/// Scratch memory of walks through both levels.
 #[derive(Debug)]
 pub struct LevelScratch {
     stored: Stack,
@@ -56,7 +56,7 @@ impl<'a> TwoLevel<'a> {
         self.stored.shapes()
     }
 
-    /// Sizes of all trees together, each counted once; depths are added up.
+    /// Sizes of all trees together, each counted once; the depths of both levels are added.
     pub fn summary(&self) -> StructureStats {
         let mut sum = self.stored.summary();
         let (mut above, mut below) = (0, sum.depth);
@@ -78,8 +78,8 @@ impl<'a> TwoLevel<'a> {
         sum
     }
 
-    /// Visits everything: each tree holds what it should, each place is in one leaf, and each placed corner is in the boxes
-    /// above the places and, carried back, no farther from itself than boxes are widened.
+    /// Visits everything: each tree holds what it should, each place is in exactly one leaf, and each placed corner is in the
+    /// boxes above its place and, transformed back, no farther from the original corner than boxes are widened.
     pub fn check(&self) -> Result<StructureStats, String> {
         self.stored.check()?;
         for (i, object) in self.objects.iter().enumerate() {
@@ -118,7 +118,7 @@ impl<'a> TwoLevel<'a> {
         Ok(())
     }
 
-    /// Goes on with a query that knows what is stored, through the objects where they stand.
+    /// Continues a query, already answered for the stored shapes, through the placed objects.
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, scratch: &mut LevelScratch, probe: &mut P) {
         let (false, Some(stack)) = (self.instanced.is_empty(), &mut scratch.object) else { return };
         let ray = BoxRay::new(query);
@@ -134,7 +134,7 @@ impl<'a> TwoLevel<'a> {
         });
     }
 
-    /// Asks for hits behind what is known of each ray, and puts what comes before it in its place.
+    /// Continues the query of each ray from its known hit, and replaces that hit by any that precedes it.
     fn go_on<G: Goal, P: Probe>(
         &self,
         rays: &[Ray],
@@ -157,7 +157,7 @@ impl<'a> TwoLevel<'a> {
         }
     }
 
-    /// The rays as the tree of what is stored knows them: by the numbers that prims have there.
+    /// Rays with their excluded prims renumbered for the tree over the stored shapes.
     fn renumber(&self, rays: &[Ray], renumbered: &mut Vec<Ray>) {
         renumbered.clear();
         renumbered.extend(rays.iter().map(|ray| match self.instanced.find(ray.exclude) {
@@ -166,11 +166,11 @@ impl<'a> TwoLevel<'a> {
         }));
     }
 
-    /// A hit such that the same stored prims come after it as after `after`.
+    /// Hit that precedes the same stored prims as `after` does.
     fn after(&self, after: &Hit) -> Hit {
         match self.instanced.find(after.prim) {
             PrimLocation::Stored(prim) => Hit { prim, ..*after },
-            // After the last stored prim with a lower number; where there is none, after everything nearer.
+            // After the last stored prim with a lower number; if there is none, after all nearer hits.
             PrimLocation::Placed(placed, _) => match placed.before.checked_sub(1) {
                 Some(prim) => Hit { prim, ..*after },
                 None => Hit { prim: NO_PRIM, t: after.t.next_down(), ..*after },
@@ -179,8 +179,7 @@ impl<'a> TwoLevel<'a> {
     }
 }
 
-/// A filter that is asked with the numbers that prims have in the tree of what is stored, and asks another with those that they
-/// have in the scene.
+/// Filter that receives prim numbers of the stored tree and passes scene numbers on to another filter.
 struct Numbered<'a, T: ?Sized> {
     instanced: &'a InstancedObjects,
     of: &'a T,

@@ -1,12 +1,12 @@
-//! Objects that are stored once and stand in several places.
+//! Instancing: objects that are stored once and placed several times.
 //!
 //! A scene may show a mesh a thousand times. Flattened, it is stored a thousand times; instanced, its triangles and the tree
-//! over them are stored once ([`Object`]), and [`TwoLevel`] holds a tree over the places where they stand. What is hit is
-//! the same bit for bit, for a triangle that a ray comes near is put into the scene's frame by the function that
-//! flattening uses ([`placed`]), and is tested there. Only boxes are asked in the object's own frame ([`ObjectTransform`] has
-//! the proof that this loses no hit).
+//! over them are stored once ([`Object`]), and [`TwoLevel`] holds a tree over the places. Hits are the same bit for bit: a
+//! triangle that a ray comes near is transformed into the scene's frame by the function that flattening uses ([`placed`]),
+//! and tested there. Only box tests happen in the object's own frame ([`ObjectTransform`] has the proof that this loses no
+//! hit).
 //!
-//! Prims have the numbers of the flattened scene: [`InstancedObjects::find`] leads from there to what is stored.
+//! Prims are numbered as in the flattened scene: [`InstancedObjects::find`] maps these numbers to the stored prims.
 
 mod levels;
 mod place;
@@ -20,17 +20,17 @@ use super::shapes::Prim;
 use super::{NO_PRIM, Shapes};
 use crate::math::triangle::Triangle;
 
-/// Triangles in a frame of their own.
+/// Triangle mesh in a frame of its own.
 #[derive(Clone, Debug)]
 pub struct Object {
-    /// Vertices that triangles use, and triangles; nothing else.
+    /// The triangles and the vertices they use; nothing else.
     shapes: Shapes,
-    /// Whether all of it stops light.
+    /// Whether all triangles are opaque.
     pub opaque: bool,
 }
 
 impl Object {
-    /// Of `vertices`, those that no triangle uses are left out. One triangle at least; indices are within range.
+    /// Creates an object of at least one triangle, with indices within range; `vertices` that no triangle uses are left out.
     pub fn new(vertices: &[crate::math::Vec3], triangles: &[[u32; 3]], opaque: bool) -> Self {
         let mut used = vec![false; vertices.len()];
         triangles.iter().flatten().for_each(|&i| used[i as usize] = true);
@@ -48,52 +48,52 @@ impl Object {
         Self { shapes, opaque }
     }
 
-    /// The triangles.
+    /// Triangles of the object.
     pub fn shapes(&self) -> &Shapes {
         &self.shapes
     }
 }
 
-/// An object where it stands.
+/// An object at one of its places.
 #[derive(Clone, Debug)]
 pub struct PlacedObject {
     /// Index into [`InstancedObjects::objects`].
     pub object: u32,
-    /// The number of its first triangle among the prims of the scene; the others follow.
+    /// Number of the object's first triangle among the prims of the scene; the others follow.
     pub first: u32,
-    /// Stored prims with lower numbers.
+    /// Number of stored prims with lower numbers.
     before: u32,
-    /// How it stands there.
+    /// Transform of the object.
     pub place: ObjectTransform,
 }
 
-/// Objects that are stored once, and the places where they stand; nothing by default.
+/// Objects that are stored once, and their places; empty by default.
 #[derive(Clone, Debug, Default)]
 pub struct InstancedObjects {
     objects: Vec<Object>,
-    /// By their first prims, ascending.
+    /// Placed objects, ascending by their first prims.
     placed: Vec<PlacedObject>,
-    /// Triangles of all that are placed.
+    /// Total number of triangles of all placed objects.
     shown: u32,
 }
 
-/// What a prim of the scene is.
+/// Location of a prim of the scene.
 #[derive(Clone, Copy, Debug)]
 pub enum PrimLocation<'k> {
     /// A prim of the shapes in the scene's frame, by its number there.
     Stored(u32),
-    /// A triangle of an object, by its number there.
+    /// A triangle of a placed object, by its number in the object.
     Placed(&'k PlacedObject, u32),
 }
 
 impl InstancedObjects {
-    /// Adds an object that stands nowhere yet; its index.
+    /// Adds an object without a place and returns its index.
     pub fn add(&mut self, object: Object) -> u32 {
         self.objects.push(object);
         index(self.objects.len()) - 1
     }
 
-    /// Puts an object somewhere; places come in the order of their first prims. `first` is that of this one.
+    /// Places an object whose first prim is `first`; calls must come in ascending order of `first`.
     pub fn put(&mut self, object: u32, first: u32, place: ObjectTransform) {
         self.placed.push(PlacedObject { object, first, before: first - self.shown, place });
         self.shown += self.count(object);
@@ -104,27 +104,27 @@ impl InstancedObjects {
         self.placed.is_empty()
     }
 
-    /// The objects that are stored once.
+    /// Objects that are stored once.
     pub fn objects(&self) -> &[Object] {
         &self.objects
     }
 
-    /// Where all of it stands.
+    /// Placed objects.
     pub fn placed(&self) -> &[PlacedObject] {
         &self.placed
     }
 
-    /// Triangles that are shown, those of an object once for each place.
+    /// Number of triangles shown: those of an object count once per place.
     pub fn shown(&self) -> u32 {
         self.shown
     }
 
-    /// Triangles that are stored.
+    /// Number of triangles stored.
     pub fn stored(&self) -> usize {
         self.objects.iter().map(|o| o.shapes.triangles.len()).sum()
     }
 
-    /// Bytes of vertices, triangles and places.
+    /// Size of vertices, triangles and places, in bytes.
     pub fn bytes(&self) -> usize {
         let shapes = |o: &Object| size_of_val(&*o.shapes.vertices) + size_of_val(&*o.shapes.triangles);
         self.objects.iter().map(shapes).sum::<usize>() + size_of_val(&*self.placed)
@@ -134,7 +134,7 @@ impl InstancedObjects {
         index(self.objects[object as usize].shapes.triangles.len())
     }
 
-    /// What prim `prim` of the scene is. [`NO_PRIM`] is stored as itself.
+    /// Location of prim `prim` of the scene. [`NO_PRIM`] is stored as itself.
     #[inline]
     pub fn find(&self, prim: u32) -> PrimLocation<'_> {
         if self.placed.is_empty() || prim == NO_PRIM {
@@ -155,7 +155,7 @@ impl InstancedObjects {
         }
     }
 
-    /// The number among the prims of the scene of a stored one.
+    /// Number in the scene of a stored prim.
     #[inline]
     pub fn number(&self, stored: u32) -> u32 {
         let behind = if stored == NO_PRIM { 0 } else { self.placed.partition_point(|p| p.before <= stored) };
@@ -165,12 +165,12 @@ impl InstancedObjects {
         }
     }
 
-    /// Triangle `triangle` of an object where it stands.
+    /// Triangle `triangle` of a placed object, in the scene's frame.
     pub fn triangle(&self, placed: &PlacedObject, triangle: u32) -> Triangle {
         self.objects[placed.object as usize].shapes.triangle(triangle).map(|corner| placed.place.corner(corner))
     }
 
-    /// What prim `prim` of the scene is, in the scene's frame; `shapes` are those that are not instanced.
+    /// Prim `prim` of the scene, in the scene's frame; `shapes` are those that are not instanced.
     #[inline]
     pub fn prim<'a>(&self, shapes: &'a Shapes, prim: u32) -> Prim<'a> {
         match self.find(prim) {
@@ -179,7 +179,7 @@ impl InstancedObjects {
         }
     }
 
-    /// From now on no instanced object is opaque: filters decide what it lets through.
+    /// Makes every instanced object non-opaque from now on: filters decide what it lets through.
     pub fn open_all(&mut self) {
         self.objects.iter_mut().for_each(|object| object.opaque = false);
     }

@@ -1,4 +1,4 @@
-//! Where an object stands: the way of its corners into the scene's frame, and of rays into its own.
+//! Placement of an object: transforms of its corners into the scene's frame, and of rays into its own.
 
 use crate::accel::Shapes;
 use crate::math::aabb::Aabb;
@@ -7,37 +7,37 @@ use crate::math::simd::{Kernel, LANES, Level, Row, Simd};
 use crate::math::triangles::Corners8;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 
-/// A corner of an object in the scene's frame: moved in `f64` and rounded once. What is flattened is placed by this, and
-/// so are instanced objects, each time a ray comes near: both are the same triangle, bit for bit.
+/// Corner of an object in the scene's frame: transformed in `f64` and rounded once. Flattening uses this function, and so do
+/// instanced objects each time a ray comes near: both give the same triangle, bit for bit.
 #[inline]
 pub fn placed(frame_from_object: &DAffine3, corner: Vec3) -> Vec3 {
     frame_from_object.transform_point3(corner.as_dvec3()).as_vec3()
 }
 
-/// Where an object stands.
+/// Transform of a placed object.
 ///
 /// # Why no hit is lost
 /// Let c be the translation, N the inverse of the matrix as computed, whatever its error. A ray o + t d that hits a placed
-/// triangle at t hits a mean of its placed corners v'. So N (o − c) + t N d, with the same t, is the same mean of the
-/// points N (v' − c), and those are within `room` of the object's own corners v, on each axis: that is how `room` is
-/// measured, corner by corner. The boxes of the object, larger by `room`, hold that point. What is left is the rounding of
-/// N (o − c) and N d: [`PLACED_PAD`](crate::math::bounds::PLACED_PAD) and
+/// triangle at t hits a convex combination of its placed corners v'. So N (o − c) + t N d, with the same t, is the same
+/// combination of the points N (v' − c), and those are within `room` of the object's own corners v, on each axis: that is how
+/// `room` is measured, corner by corner. The boxes of the object, widened by `room`, contain that point. What remains is the
+/// rounding of N (o − c) and N d: [`PLACED_PAD`](crate::math::bounds::PLACED_PAD) and
 /// [`PLACED_DRIFT`](crate::math::bounds::PLACED_DRIFT).
 #[derive(Clone, Debug)]
 pub struct ObjectTransform {
     frame_from_object: DAffine3,
     /// N.
     object_from_frame: DMat3,
-    /// How far corners that were placed and carried back may be from where they were.
+    /// Largest distance on each axis between an object's corners and the same corners placed and transformed back.
     pub room: Vec3,
-    /// Around all placed corners, exactly.
+    /// Exact box around all placed corners.
     pub bounds: Aabb,
 }
 
 impl ObjectTransform {
-    /// A place from which rays can be carried to the corners of `object`, all of which count; `None` where that is too
-    /// inexact to be of use: singular or nearly so, far too large or small, or so far away that rounding moves the corners
-    /// by a part of the object's size that matters.
+    /// Creates the transform of `object`, all of whose corners count; `None` if it is too inexact to be of use: singular or
+    /// nearly so, far too large or small, or so far away that rounding moves the corners by a significant part of the
+    /// object's size.
     pub fn new(frame_from_object: DAffine3, object: &Shapes) -> Option<Self> {
         let (m, n) = (frame_from_object.matrix3, frame_from_object.matrix3.inverse());
         let (grows, shrinks) = (row_sum(&m), row_sum(&n));
@@ -63,7 +63,7 @@ impl ObjectTransform {
         placed(&self.frame_from_object, corner)
     }
 
-    /// Eight triangles of the object where they stand, each corner by [`placed`], operation by operation.
+    /// Eight triangles of the object in the scene's frame, each corner by [`placed`], operation by operation.
     #[inline(always)]
     pub(in crate::accel) fn block<S: Simd>(&self, s: S, corners: &Corners8) -> Corners8 {
         [self.row(s, &corners[0]), self.row(s, &corners[1]), self.row(s, &corners[2])]
@@ -84,19 +84,20 @@ impl ObjectTransform {
         there
     }
 
-    /// A point of the scene's frame in that of the object.
+    /// Transforms a point of the scene's frame into the object's.
     #[inline]
     pub fn carried(&self, point: Vec3) -> DVec3 {
         self.object_from_frame * (point.as_dvec3() - self.frame_from_object.translation)
     }
 
-    /// A direction likewise; its length changes as those of distances do, so that t stays what it was.
+    /// Transforms a direction of the scene's frame into the object's; its length scales as distances do, so that t stays the
+    /// same.
     #[inline]
     pub fn carried_dir(&self, dir: Vec3) -> DVec3 {
         self.object_from_frame * dir.as_dvec3()
     }
 
-    /// A box of the object where it stands, as a box around it: to be looked at.
+    /// Box around a box of the object in the scene's frame; for display only.
     #[expect(clippy::cast_possible_truncation, reason = "a box to be looked at")]
     pub(in crate::accel) fn around(&self, bounds: &Aabb) -> Aabb {
         let corner = |i: usize| {
@@ -108,20 +109,21 @@ impl ObjectTransform {
     }
 }
 
-/// All corners of an object that stands somewhere, to be placed and carried back.
+/// Kernel that transforms all corners of a placed object to the scene and back.
 struct Measure<'a> {
     place: &'a ObjectTransform,
     corners: &'a [Vec3],
 }
 
-/// What came of it.
+/// Result of [`Measure`].
 #[derive(Debug, PartialEq)]
 struct Measured {
-    /// The furthest that one came back from where it was, on each axis; not finite where one is not.
+    /// Largest distance, on each axis, between a corner and its transformed and transformed-back copy; not finite if any is
+    /// not.
     room: DVec3,
-    /// Around all where they stand.
+    /// Box around all placed corners.
     bounds: Aabb,
-    /// Around all in the object's own frame.
+    /// Box around all corners in the object's own frame.
     own: Aabb,
 }
 
@@ -134,10 +136,10 @@ impl Kernel for Measure<'_> {
         let (translation, n) = (place.frame_from_object.translation, place.object_from_frame);
         let (mut lo, mut hi) = ([s.splat(f32::INFINITY); 6], [s.splat(f32::NEG_INFINITY); 6]);
         let (mut room, mut finite) = ([s.splat_f64(0.0); 3], (1 << LANES) - 1);
-        // Loops and no closures: those are compiled without the instructions.
+        // Loops, because closures would be compiled without the vector instructions.
         for run in corners.chunks(LANES) {
             let mut corner = [[0.0; LANES]; 3];
-            // The last one fills up what is left.
+            // The last corner fills the remaining lanes.
             let eight: [Vec3; LANES] = match run.first_chunk() {
                 Some(eight) => *eight,
                 None => std::array::from_fn(|lane| run[lane.min(run.len() - 1)]),
@@ -151,7 +153,7 @@ impl Kernel for Measure<'_> {
                 from[k] = s.sub_f64(s.widen(s.load(&there[k])), s.splat_f64(translation[k]));
             }
             for k in 0..3 {
-                // As `carried` has it.
+                // The same operations as `carried`.
                 let x = s.mul_f64(s.splat_f64(n.x_axis[k]), from[0]);
                 let y = s.mul_f64(s.splat_f64(n.y_axis[k]), from[1]);
                 let z = s.mul_f64(s.splat_f64(n.z_axis[k]), from[2]);
@@ -182,7 +184,7 @@ impl Kernel for Measure<'_> {
     }
 }
 
-/// The largest sum of the sizes of a row: how much the largest coordinate may grow.
+/// Largest absolute row sum: the factor by which the largest coordinate may grow.
 fn row_sum(m: &DMat3) -> f64 {
     (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element()
 }

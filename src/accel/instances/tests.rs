@@ -8,7 +8,7 @@ use crate::math::simd::{Kernel, LANES, Level, Simd};
 use crate::math::triangles::{Corners8, corners_of, set_corners};
 use crate::math::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
-/// A scene twice: instanced, and flattened.
+/// A scene in both forms: instanced and flattened.
 struct Both {
     stored: Shapes,
     instanced: InstancedObjects,
@@ -16,7 +16,7 @@ struct Both {
 }
 
 impl Both {
-    /// Objects where they stand, in this order, with everything else of `others` between the first and the second.
+    /// Places objects in this order, with all of `others` between the first and the second.
     fn new(objects: Vec<Object>, places: &[(usize, DAffine3)], others: &Shapes) -> Self {
         let mut instanced = InstancedObjects::default();
         let (mut flat, mut stored) = (Shapes::default(), Shapes::default());
@@ -69,7 +69,7 @@ fn object(shapes: &Shapes, opaque: bool) -> Object {
     Object::new(&shapes.vertices, &shapes.triangles, opaque)
 }
 
-/// Three objects, one of which lets light through.
+/// Three objects, one of which is not opaque.
 fn objects() -> Vec<Object> {
     vec![object(&scenes::star(12, 8), true), object(&scenes::soup(40, 0.8), false), object(&scenes::lattice(30), true)]
 }
@@ -83,7 +83,7 @@ fn others() -> Shapes {
     Shapes { opaque, ..shapes }
 }
 
-/// Some way of standing about: turned, stretched, mirrored, sheared, around `at`, of about this size.
+/// Random transform: rotated, stretched, mirrored or sheared, around `at`, of about the given size.
 fn standing(r: &mut Random, i: usize, size: f64, at: DVec3) -> DAffine3 {
     let mut unit = || f64::from(r.unit());
     let turn = DMat3::from_quat(DQuat::from_euler(glam::EulerRot::XYZ, 7.0 * unit(), 7.0 * unit(), 7.0 * unit()));
@@ -100,13 +100,14 @@ fn standing(r: &mut Random, i: usize, size: f64, at: DVec3) -> DAffine3 {
     DAffine3 { matrix3: matrix3 * size, translation: (somewhere * size) + at }
 }
 
-/// Places of all objects in turn.
+/// `n` places, the objects taking turns.
 fn about(n: usize, size: f64, at: DVec3) -> Vec<(usize, DAffine3)> {
     let mut r = Random::new(21);
     (0..n).map(|i| (i % 3, standing(&mut r, i / 3, size, at))).collect()
 }
 
-/// The first hits, those behind them, what is blocked, and what would be if some of the rest let light through.
+/// The first hits, the hits behind them, occlusion, and occlusion with a filter that lets light through some of the other
+/// prims.
 fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 10]> {
     crate::accel::tests::answers(accel, rays)
 }
@@ -186,7 +187,7 @@ fn singular_and_extreme_placements_are_flattened() {
     assert_hits_of_the_flattened_scene("one is flat", &both, &scenes::rays(&both.flat, 30));
 }
 
-/// Objects that touch: rays through edges and corners that belong to several of them, and copies in one place.
+/// Objects that touch: rays through shared edges and corners, and copies at one place.
 #[test]
 fn rays_through_edges_that_objects_share_hit_the_lowest_prim_of_all() {
     let moves = [DVec3::ZERO, DVec3::X, DVec3::X, DVec3::Y, DVec3::new(1.0, 1.0, 0.0), DVec3::ZERO];

@@ -1,4 +1,4 @@
-//! Nothing slips between prims that share an edge or a corner, and nothing is closed that is open.
+//! No ray slips between prims that share an edge or a corner, and no gap is closed.
 
 use std::f32::consts::TAU;
 
@@ -18,7 +18,7 @@ fn every_point_of_the_diagonal_of_a_square_is_hit_and_lies_in_its_plane() {
         .map(|i| i as f32 / 1024.0)
         .map(|x| towards(origin, Vec3::new(x, x, 0.0)))
         .collect();
-    // The direction of a report of a ray that got through.
+    // Direction from a bug report about a ray that slipped through.
     rays.push(ray(origin, Vec3::new(0.304_584_47, 0.304_584_47, -0.902_472_5)));
     let ulp_of_ten = f64::from(10f32.next_up()) - 10.0;
     with_every_kind(&shapes, |kind, accel| {
@@ -48,7 +48,7 @@ fn the_middle_of_a_fan_is_hit_from_every_direction_above_it() {
     }
 }
 
-/// Rays from inside a star towards its corners, edge middles, edge points, and anywhere.
+/// Rays from inside a star towards its corners, edge midpoints, random points of edges and random points.
 fn outwards(shapes: &Shapes, center: Vec3, n: usize) -> Vec<Ray> {
     let mut r = Random::new(22);
     let mut rays = Vec::new();
@@ -62,7 +62,7 @@ fn outwards(shapes: &Shapes, center: Vec3, n: usize) -> Vec<Ray> {
     rays
 }
 
-/// The structures that answer quickly get all rays, the others some.
+/// Asserts that every ray hits; slow structures get only some of the rays.
 fn assert_nothing_escapes(what: &str, shapes: &Shapes, rays: &[Ray]) {
     with_every_kind(shapes, |kind, accel| {
         let rays = if kind.is_slow() { &rays[..rays.len().min(count(100, 10_000))] } else { rays };
@@ -82,7 +82,7 @@ fn nothing_escapes_from_a_closed_mesh() {
     assert_nothing_escapes("star", &shapes, &outwards(&shapes, Vec3::ZERO, count(1500, 2_000_000)));
 }
 
-/// C4 (offsets). The mesh is rounded where it stands, and stays closed.
+/// C4 (offsets). The mesh is rounded at its offset position, and stays closed.
 #[test]
 fn nothing_escapes_from_a_closed_mesh_far_from_the_origin() {
     for offset in [1e3, 1e5] {
@@ -106,7 +106,7 @@ fn a_ray_enters_and_leaves_a_closed_mesh_in_turn() {
         for &ray in &rays {
             let hits = every_hit(accel, ray);
             assert_eq!(hits.len() % 2, 0, "{kind}: {ray:?} {hits:?}");
-            // The sides of the star's triangles that face outwards are their front.
+            // The outward sides of the star's triangles are their front sides.
             let entering = |h: &Hit| triangle::normal(&shapes.triangle(h.prim)).dot(ray.dir) < 0.0;
             let in_turn = hits.iter().enumerate().all(|(i, h)| entering(h) == (i % 2 == 0));
             let tie = hits.windows(2).any(|h| h[0].t == h[1].t);
@@ -117,7 +117,7 @@ fn a_ray_enters_and_leaves_a_closed_mesh_in_turn() {
     });
 }
 
-/// C6 (T-junction). A corner on an edge, but for rounding, leaves a gap: it is there exactly where it is.
+/// C6 (T-junction). A corner that misses the edge by rounding leaves a gap, which is open exactly as far as it extends.
 #[test]
 fn a_t_junction_is_as_open_as_exact_arithmetic_says() {
     let (a, b) = (Vec3::new(-0.913, 0.137, 0.731), Vec3::new(1.171, -0.319, -0.577));
@@ -135,7 +135,7 @@ fn a_t_junction_is_as_open_as_exact_arithmetic_says() {
 /// C7 (open edge).
 #[test]
 fn the_border_of_an_open_strip_is_hit_exactly_where_it_is() {
-    // A strip with half a turn.
+    // A strip with half a twist.
     let n = 48u32;
     let point = |i: u32, side: f32| {
         let turn = TAU * i as f32 / n as f32;
@@ -170,11 +170,11 @@ fn rays_along_the_axes_through_corners_of_an_integer_mesh_miss_nothing() {
         }
     }
     let hits = assert_exact("integers", &shapes, &rays, 0.501);
-    // All but those that only touch an outline whose triangles are seen edge on.
+    // All but the corners that only touch an outline of triangles seen edge-on.
     assert!(hits > rays.len() * 9 / 10, "{hits} of {}", rays.len());
 }
 
-/// C9 (faces back to back).
+/// C9 (coincident faces).
 #[test]
 fn two_boxes_that_share_a_face_are_hit_there_twice_in_order_of_their_prims() {
     let mut shapes = Shapes::default();

@@ -1,4 +1,4 @@
-//! Input without area, without numbers, of extreme size, and polygons of every shape.
+//! Input without area, NaN and infinite numbers, extreme sizes, and polygons of every shape.
 
 use super::super::scenes::{all, broken_rays, copies, mesh, mix, moved, ray, rays, soup};
 use super::*;
@@ -45,7 +45,7 @@ fn of_copies_of_a_triangle_the_lowest_is_hit_and_all_follow() {
     });
 }
 
-/// D4 (coplanar faces that overlap).
+/// D4 (overlapping coplanar faces).
 #[test]
 fn of_overlapping_faces_in_one_plane_the_lowest_is_hit() {
     // Integer points of the plane x + y + z = 0.
@@ -106,7 +106,7 @@ fn the_smallest_and_largest_coordinates_are_hit_as_in_exact_arithmetic() {
     }
 }
 
-/// Whether a point is inside a polygon by the even–odd rule, in integers; the point is not level with a corner.
+/// Whether a point is inside a polygon by the even–odd rule, in integers; no corner may have the point's y.
 fn inside(outline: &[(i64, i64)], (x, y): (i64, i64)) -> bool {
     let edges = outline.iter().zip(outline.iter().cycle().skip(1));
     let right_of_point = |&(&(ax, ay), &(bx, by)): &(&(i64, i64), &(i64, i64))| {
@@ -115,7 +115,7 @@ fn inside(outline: &[(i64, i64)], (x, y): (i64, i64)) -> bool {
     edges.filter(right_of_point).count() % 2 == 1
 }
 
-/// D11 (polygons): concave, crossing itself, with a hole by a bridge, with repeated corners and with a spike.
+/// D11 (polygons): concave, self-intersecting, with a hole by a bridge, with repeated corners, and with a spike.
 #[test]
 fn polygons_of_every_shape_are_hit_where_the_even_odd_rule_says() {
     let outlines: [&[(i64, i64)]; 5] = [
@@ -137,10 +137,10 @@ fn polygons_of_every_shape_are_hit_where_the_even_odd_rule_says() {
         };
         with_every_kind(&shapes, |kind, accel| {
             for (x, y) in (-15..15).flat_map(|x| (-15..15).map(move |y| (x, y))) {
-                // In halves, so that rays pass between corners.
+                // In half units, so that rays pass between corners.
                 let doubled: Vec<_> = outline.iter().map(|&(x, y)| (2 * x, 2 * y)).collect();
                 let at = Vec3::new(x as f32 + 0.5, y as f32 + 0.5, 7.5);
-                // A ray exactly through an edge belongs to one side of it.
+                // A ray exactly through an edge belongs to one of its sides.
                 let on_edge = doubled.iter().zip(doubled.iter().cycle().skip(1)).any(|(&(ax, ay), &(bx, by))| {
                     let (px, py) = (2 * x + 1, 2 * y + 1);
                     (bx - ax) * (py - ay) == (px - ax) * (by - ay)
@@ -154,11 +154,11 @@ fn polygons_of_every_shape_are_hit_where_the_even_odd_rule_says() {
     }
 }
 
-/// D12 (quads that are not planar).
+/// D12 (non-planar quads).
 #[test]
 fn a_warped_quad_is_hit_on_one_of_the_triangles_beside_its_shorter_diagonal() {
     let mut r = Random::new(33);
-    // Moved so little that they stay convex: a concave one has no choice.
+    // Displaced so little that the quads stay convex: a concave one has only one cut.
     for _ in 0..count(40, 4000) {
         let at = |x: f32, y: f32, r: &mut Random| Vec3::new(x, y, 0.0) + r.cube() * 0.2;
         let quad = [at(0.0, 0.0, &mut r), at(1.0, 0.0, &mut r), at(1.0, 1.0, &mut r), at(0.0, 1.0, &mut r)];

@@ -1,4 +1,4 @@
-//! Rays and prims where cells meet. That each margin is needed (G12) is shown beside the structures: `grid/margins`,
+//! Rays and prims on the borders of cells. Tests that each margin is needed (G12) are beside the structures: `grid/margins`,
 //! `wide/margins`.
 
 use super::super::scenes::{all, huge_and_tiny, lattice, mesh, mix, moved, ray, rays, soup, star};
@@ -6,21 +6,21 @@ use super::*;
 use crate::accel::grid::margins::{EIGHT, WIDTH, faces_between_cells, plane};
 use crate::math::random::Random;
 
-/// Answers of the grid of eight cells on each axis, whose planes are known, and of every structure.
+/// Asserts brute force's answers for every structure and for the grid of eight cells per axis, whose planes are known.
 fn assert_grids_agree(what: &str, shapes: &Shapes, rays: &[Ray]) {
     assert_all_agree(what, shapes, rays);
     let grid: GridOctree = GridOctree::build(shapes, &EIGHT);
     assert_same(what, rays, &answers(&grid, rays), &answers(&Unculled::new(shapes), rays));
 }
 
-/// Every direction of −1, 0 and 1, with either sign of each zero.
+/// Every direction with components −1, 0 and 1, with either sign of each zero.
 fn directions() -> Vec<Vec3> {
     let steps = [-1.0f32, -0.0, 0.0, 1.0];
     let all = (0..64).map(|i| Vec3::new(steps[i & 3], steps[i >> 2 & 3], steps[i >> 4]));
     all.filter(|d| *d != Vec3::ZERO).collect()
 }
 
-/// G1 (in planes, along edges, through corners of cells).
+/// G1 (rays in planes, along edges and through corners of cells).
 #[test]
 fn rays_in_planes_along_edges_and_through_corners_of_cells_lose_nothing() {
     let (shapes, rays) = faces_between_cells();
@@ -33,7 +33,7 @@ fn rays_in_planes_along_edges_and_through_corners_of_cells_lose_nothing() {
     assert_grids_agree("lattice", &shapes, &rays);
 }
 
-/// G2 (signs of zero, faces of the scene's box).
+/// G2 (signed zeros, faces of the scene's box).
 #[test]
 fn rays_from_and_beside_the_faces_of_the_box_in_all_directions_lose_nothing() {
     let shapes = lattice(12);
@@ -59,7 +59,7 @@ fn rays_from_and_beside_the_faces_of_the_box_in_all_directions_lose_nothing() {
     assert_grids_agree("box", &shapes, &rays);
 }
 
-/// G3 (nearly parallel).
+/// G3 (rays nearly parallel to planes).
 #[test]
 fn rays_nearly_parallel_to_planes_lose_nothing_and_end() {
     let mut r = Random::new(42);
@@ -82,7 +82,7 @@ fn rays_nearly_parallel_to_planes_lose_nothing_and_end() {
     }
 }
 
-/// A square in the plane between two cells of [`EIGHT`], among corners that give the grid its size.
+/// A square in the plane between two cells of [`EIGHT`], with corner triangles that give the grid its size.
 fn square_between_cells() -> Shapes {
     let (lo, hi, x) = (plane(2), plane(5), plane(4));
     let ends =
@@ -91,7 +91,7 @@ fn square_between_cells() -> Shapes {
     mesh([ends.as_slice(), &square].concat(), vec![[0, 1, 2], [3, 4, 5], [6, 7, 8], [6, 8, 9]])
 }
 
-/// G4 (a face in a plane between cells), G5 (a hit exactly where a cell is left).
+/// G4 (a face in a plane between cells), G5 (a hit exactly at the exit of a cell).
 #[test]
 fn a_face_between_cells_is_hit_from_both_sides_and_by_ranges_that_end_on_it() {
     let shapes = square_between_cells();
@@ -114,7 +114,7 @@ fn a_face_between_cells_is_hit_from_both_sides_and_by_ranges_that_end_on_it() {
     assert_grids_agree("square", &shapes, &rays);
 }
 
-/// G6 (a prim that belongs to a cell by the padding only).
+/// G6 (a prim that overlaps only the padding of a cell).
 #[test]
 fn a_face_just_beside_a_plane_between_cells_is_listed_on_both_sides() {
     let mut shapes = square_between_cells();
@@ -157,7 +157,7 @@ fn teapot_in_a_stadium(ratio: f32) -> Shapes {
     mesh(shapes.vertices, shapes.triangles)
 }
 
-/// G8 (teapot in a stadium), G9 (all in one cell).
+/// G8 (teapot in a stadium), G9 (everything in one cell).
 #[test]
 fn a_small_model_in_a_large_hall_is_hit_like_any_other() {
     for ratio in [1e-3, 1e-6] {
@@ -211,7 +211,7 @@ fn random_soups_of_any_number_are_hit_as_by_brute_force() {
     }
 }
 
-/// G13 (where rays start).
+/// G13 (ray origins).
 #[test]
 fn rays_may_start_in_a_cell_behind_the_scene_or_very_far_away() {
     let shapes = mix();
@@ -231,7 +231,7 @@ fn rays_may_start_in_a_cell_behind_the_scene_or_very_far_away() {
     assert_grids_agree("starts", &shapes, &rays);
 }
 
-/// G14 (invariants): each prim is listed where it touches, and nowhere else; each is below the boxes that hold it.
+/// G14 (invariants): each prim is listed exactly in the cells it overlaps, and lies inside every box above it.
 #[test]
 fn every_structure_over_every_scene_is_sound() {
     for (name, shapes) in all() {

@@ -1,4 +1,4 @@
-//! Any scene and any ray: coordinates of all exponents, lattice points and their neighbours, rays aimed at all of that.
+//! Hostile scenes and rays: coordinates of all exponents, lattice points and their neighbours, rays aimed at all of them.
 //!
 //! Every structure gives the answers of brute force bit for bit, and the first hit is that of exact arithmetic.
 
@@ -6,14 +6,14 @@ use super::super::scenes::mesh;
 use super::*;
 use crate::math::random::Random;
 
-/// How coordinates of one scene are drawn.
+/// Distribution of the coordinates of a scene.
 #[derive(Clone, Copy, Debug)]
 enum Coordinates {
-    /// Every exponent from 2⁻¹⁰⁰ to 2¹⁰⁰ alike.
+    /// Every exponent from 2⁻¹⁰⁰ to 2¹⁰⁰, equally likely.
     AllExponents,
-    /// Small integers, and the floats beside them.
+    /// Small integers and their neighbouring floats.
     Lattice,
-    /// All near one place, of another magnitude than their distances.
+    /// All near one place, whose magnitude differs from their distances.
     Crowded,
 }
 
@@ -37,7 +37,7 @@ impl Coordinates {
     }
 }
 
-/// Triangles of such corners, some of them shared.
+/// Triangles with such corners, some of them shared.
 fn scene(coordinates: Coordinates, r: &mut Random) -> Shapes {
     let n = 1 + r.below(40) as u32;
     let corners = 3 + r.below(60);
@@ -46,7 +46,7 @@ fn scene(coordinates: Coordinates, r: &mut Random) -> Shapes {
     mesh(vertices, triangles)
 }
 
-/// Rays aimed at corners, edges, faces and anything, from anywhere.
+/// Rays from random points, aimed at corners, edges, faces and random points.
 fn aimed(coordinates: Coordinates, shapes: &Shapes, n: usize, r: &mut Random) -> Vec<Ray> {
     let mut rays = Vec::new();
     for i in 0..n {
@@ -75,7 +75,7 @@ fn hostile_scenes_and_rays_are_answered_as_by_brute_force_and_exact_arithmetic()
             let shapes = scene(coordinates, &mut r);
             let rays = aimed(coordinates, &shapes, 40, &mut r);
             let what = format!("{coordinates:?}, seed {seed}");
-            // Ranges hold for distances that are rounded, and the oracle knows one of several copies only.
+            // Ranges apply to rounded distances, and the oracle knows only one of several copies.
             let whole: Vec<Ray> = rays.iter().map(|r| ray(r.origin, r.dir)).collect();
             hits += assert_exact(&what, &shapes, &whole, 0.501);
             assert_all_agree(&what, &shapes, &rays);

@@ -1,8 +1,8 @@
-//! The test catalogue: what has gone wrong in ray tracers, each case against an oracle of its own and with every structure.
+//! Test catalogue: known failures of ray tracers, each checked against its own oracle and with every structure.
 //!
-//! Letters: C connectivity, D degenerate input, G grids, P precision; each test names its own. Counts are small so that
-//! all of it takes seconds; with the environment variable `MESHRAY_LONG=1` they are those of the full catalogue, for a
-//! release build: `MESHRAY_LONG=1 cargo test --release --lib catalogue`.
+//! Letters: C connectivity, D degenerate input, G grids, P precision; each test names its case. Counts are small, so that all
+//! tests take seconds; the environment variable `MESHRAY_LONG=1` raises them to the full catalogue, for a release build:
+//! `MESHRAY_LONG=1 cargo test --release --lib catalogue`.
 
 mod connectivity;
 mod degenerate;
@@ -16,12 +16,12 @@ use crate::accel::*;
 use crate::bench::oracle::{Oracle, ulps};
 use crate::math::Vec3;
 
-/// `MESHRAY_LONG=1`: the full counts.
+/// Whether `MESHRAY_LONG=1` asks for the full counts.
 fn is_long() -> bool {
     std::env::var("MESHRAY_LONG").is_ok_and(|v| v == "1")
 }
 
-/// A count for every day, and the full one.
+/// Everyday count, or the full one.
 fn count(short: usize, long: usize) -> usize {
     if is_long() { long } else { short }
 }
@@ -39,7 +39,7 @@ fn closest<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<Hit> {
     hits
 }
 
-/// All hits of one ray in order.
+/// All hits of one ray in order, up to the final miss.
 fn every_hit<A: Accel>(accel: &A, ray: Ray) -> Vec<Hit> {
     let mut hits = closest(accel, &[ray]);
     while let Some(last) = hits.last().filter(|h| h.is_some()) {
@@ -51,14 +51,14 @@ fn every_hit<A: Accel>(accel: &A, ray: Ray) -> Vec<Hit> {
     hits
 }
 
-/// Every structure is sound and gives the answers of brute force, bit for bit, to all three queries.
+/// Asserts that every structure is sound and answers all three queries like brute force, bit for bit.
 fn assert_all_agree(what: &str, shapes: &Shapes, rays: &[Ray]) {
     let expected = answers(&Unculled::new(shapes), rays);
     let every = |n: usize| {
         let pairs = rays.iter().zip(&expected).step_by(n);
         pairs.map(|(ray, answer)| (*ray, *answer)).unzip::<_, _, Vec<Ray>, Vec<_>>()
     };
-    // Slow ones get some of the rays.
+    // Slow structures get only some of the rays.
     let (all, some) = (every(1), every(5));
     with_every_kind(shapes, |kind, accel| {
         assert!(accel.check().is_ok(), "{what}, {kind}: {:?}", accel.check());
@@ -67,7 +67,7 @@ fn assert_all_agree(what: &str, shapes: &Shapes, rays: &[Ray]) {
     });
 }
 
-/// Every structure finds the first hit of exact arithmetic, its distance within `most` units in the last place; the number
+/// Asserts that every structure finds the first hit of exact arithmetic, its distance within `most` ulp; returns the number
 /// of hits.
 fn assert_exact(what: &str, shapes: &Shapes, rays: &[Ray], most: f64) -> usize {
     let oracle = Oracle::new(shapes);
@@ -80,7 +80,7 @@ fn assert_exact(what: &str, shapes: &Shapes, rays: &[Ray], most: f64) -> usize {
             };
             assert!(hit.is_some(), "{what}, {kind}: nothing where {truth:?} is, {ray:?}");
             assert!(ulps(hit.t, truth.t) <= most, "{what}, {kind}: {hit:?} for {truth:?}, {ray:?}");
-            // Rounded, distances can be equal that are not; then the lowest prim is hit.
+            // Different distances can be equal when rounded; then the lowest prim is hit.
             let as_near = || oracle.meets(ray, hit.prim).is_some_and(|t| ulps(hit.t, t) <= most);
             assert!(
                 hit.prim == truth.prim || as_near(),
@@ -93,7 +93,7 @@ fn assert_exact(what: &str, shapes: &Shapes, rays: &[Ray], most: f64) -> usize {
     truths.iter().flatten().count()
 }
 
-/// A ray from one point towards another.
+/// Ray from one point towards another.
 fn towards(origin: Vec3, target: Vec3) -> Ray {
     ray(origin, target - origin)
 }

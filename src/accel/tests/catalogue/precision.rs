@@ -1,4 +1,4 @@
-//! Verdicts and distances where numbers are bad. Two more are elsewhere: P4 (moved far away) with whole pictures in the
+//! Verdicts and distances of ill-conditioned input. Two cases are elsewhere: P4 (moved far away) with whole pictures in the
 //! tests of the program, P9 (spheres) beside the sphere's test.
 
 use super::super::scenes::{mesh, moved, ray, rays, seal, soup, star};
@@ -6,7 +6,7 @@ use super::*;
 use crate::math::random::Random;
 use crate::math::triangle;
 
-/// P1 (slivers). Distances are those of exact arithmetic, rounded once: well within the 4 ulp that are asked for.
+/// P1 (slivers). Distances are those of exact arithmetic, rounded once: well within the required 4 ulp.
 #[test]
 fn slivers_are_hit_where_they_are_at_the_right_distance() {
     let mut r = Random::new(51);
@@ -80,7 +80,7 @@ fn a_scene_scaled_by_a_power_of_two_gives_the_same_bits() {
         let larger = moved(shapes.clone(), scale, Vec3::ZERO);
         let scaled: Vec<Ray> =
             rays.iter().map(|r| Ray { origin: r.origin * scale, dir: r.dir * scale, ..*r }).collect();
-        // Where a component is so small that it loses bits, the ray is another one.
+        // A ray with a component so small that it loses bits is a different ray.
         let kept: Vec<bool> =
             rays.iter().zip(&scaled).map(|(a, b)| b.dir / scale == a.dir && b.origin / scale == a.origin).collect();
         let [expected, got] = [answers(&Unculled::new(&shapes), &rays), answers(&Unculled::new(&larger), &scaled)];
@@ -90,7 +90,7 @@ fn a_scene_scaled_by_a_power_of_two_gives_the_same_bits() {
     }
 }
 
-/// P6 (axes exchanged and mirrored).
+/// P6 (axes permuted and mirrored).
 #[test]
 fn exchanged_and_mirrored_axes_give_the_same_hits() {
     let shapes = soup(200, 0.5);
@@ -114,7 +114,7 @@ fn exchanged_and_mirrored_axes_give_the_same_hits() {
     }
 }
 
-/// P7 (corners turned).
+/// P7 (corners rotated).
 #[test]
 fn turned_corners_give_the_same_distance_and_turned_weights() {
     let shapes = soup(200, 0.5);
@@ -125,7 +125,7 @@ fn turned_corners_give_the_same_distance_and_turned_weights() {
     with_every_kind(&turned, |kind, accel| {
         for ((ray, a), b) in rays.iter().zip(&expected).zip(closest(accel, &rays)) {
             assert_eq!((a.t.to_bits(), a.prim), (b.t.to_bits(), b.prim), "{kind}: {ray:?}");
-            // Corner 1 of the one is corner 0 of the other: weights of b, c become those of a, b.
+            // Corner 1 of one triangle is corner 0 of the other: weights of b, c become those of a, b.
             let (weight_of_a, last) = (1.0 - a.u - a.v, 1.0 - b.u - b.v);
             let near = |x: f32, y: f32| (x - y).abs() <= f32::EPSILON;
             assert!(!a.is_some() || near(a.u, last) && near(a.v, b.u) && near(weight_of_a, b.v), "{kind}: {a:?} {b:?}");
@@ -159,14 +159,15 @@ fn tests_in_double_precision_hit_the_same_prims_away_from_edges() {
         );
     for other in others {
         for ((ray, a), b) in rays.iter().zip(&exact).zip(&other) {
-            // Weights near 0 or 1: so near to an edge that double precision may err.
+            // Weights near 0 or 1: so close to an edge that double precision may err.
             let near_edge = [a.u, a.v, 1.0 - a.u - a.v].iter().any(|w| *w < 1e-9);
             assert!(near_edge || (a.prim == b.prim && (a.t - b.t).abs() <= a.t * f32::EPSILON), "{ray:?} {a:?} {b:?}");
         }
     }
 }
 
-/// Spheres and cylinders that a ray meets where it starts, nearly: what is left of c = |f|² − r² is all that tells how near.
+/// Spheres and cylinders that a ray hits almost at its origin, so that c = |f|² − r² nearly cancels and only its remainder
+/// gives the distance.
 #[test]
 fn round_shapes_that_touch_the_start_of_a_ray_are_where_every_structure_finds_them() {
     let mut r = Random::new(58);
