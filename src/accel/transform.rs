@@ -1,16 +1,16 @@
-//! The scene is turned for each ray, so that the ray becomes the third axis.
+//! The scene is transformed for each ray, so that the ray becomes the third axis.
 //!
-//! What the ray can hit then straddles the origin of the first two axes: two comparisons each, after every corner has been
-//! transformed. What is left is sorted by depth and tested in that order until the next begins beyond the best hit. All
-//! prims are looked at for every ray: it saves tests, not time.
+//! A prim that the ray can hit then straddles the origin on the first two axes: two comparisons each, after every corner has
+//! been transformed. The remaining prims are sorted by depth and tested in that order until the next begins beyond the best
+//! hit. All prims are examined for every ray: it saves tests, not time.
 //!
-//! The axes are those of sheared ray space ([`RaySpace`]): a shear keeps the extents' signs as a rotation does.
+//! The axes are those of sheared ray space ([`RaySpace`]): a shear keeps the signs of extents, as a rotation does.
 //!
 //! # Why no hit is lost
-//! With D the largest difference of coordinates between a point and the ray's origin: its sheared coordinates err by
-//! [`HEIGHT_F64`] D, its depth by two roundings. A point within r of another, whose direction has no component larger
-//! than that along the third axis, is within √2 r of it in each sheared axis and r in the third. Extents are widened by
-//! `SHADOW` D, depths as in [`slabs`](super::slabs).
+//! Let D be the largest coordinate difference between a point and the ray's origin: its sheared coordinates err by
+//! [`HEIGHT_F64`] D, its depth by two roundings. For a direction with no component larger than that along the third axis, a
+//! point within r of another is within √2 r of it in each sheared axis and r in the third. Extents are widened by `SHADOW` D,
+//! depths as in [`slabs`](super::slabs).
 
 use super::query::{Culling, Goal, Query};
 use super::shapes::Prim;
@@ -20,25 +20,25 @@ use crate::math::bounds::HEIGHT_F64;
 use crate::math::shear::RaySpace;
 use crate::math::{DVec3, Vec3};
 
-/// How much is allowed for in a sheared coordinate, relative to the distance from the origin: its error, and the much
-/// smaller ones of a sphere's or cone's own test, 16 times over.
+/// Margin of a sheared coordinate, relative to the distance from the origin: its error, and the much smaller ones of a
+/// sphere's or cone's own test, 16 times over.
 const SHADOW: f64 = 16.0 * HEIGHT_F64;
 
-/// Nothing is built: the work is done for each ray.
+/// Structure that builds nothing and transforms all shapes for each ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Transformed<'a> {
     shapes: &'a Shapes,
 }
 
-/// One ray's view of the scene.
+/// Scratch memory: the scene in the axes of one ray.
 #[derive(Clone, Debug, Default)]
 pub struct Turned {
     corners: Vec<Shadow>,
-    /// Depth at which each prim that may be hit begins.
+    /// Near depth of each prim that may be hit, and the prim.
     order: Vec<(f64, u32)>,
 }
 
-/// What a thing covers in a ray's own axes.
+/// Extent in the axes of a ray.
 #[derive(Clone, Copy, Debug)]
 struct Shadow {
     lo: DVec3,
@@ -52,17 +52,17 @@ impl Shadow {
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
-    /// Whether the ray runs through it.
+    /// Whether the ray passes through the extent.
     fn straddles(&self) -> bool {
         self.lo.x <= 0.0 && self.lo.y <= 0.0 && self.hi.x >= 0.0 && self.hi.y >= 0.0
     }
 }
 
-/// The way into a ray's own axes.
+/// Transform into the axes of a ray.
 struct Turn<'r> {
     ray: &'r RaySpace,
     shear: (f64, f64),
-    /// Depths are distances along the ray.
+    /// Factor of depths, which are distances along the ray.
     depth: f64,
 }
 
@@ -72,7 +72,7 @@ impl<'r> Turn<'r> {
         Self { ray, shear: (x / z, y / z), depth: z }
     }
 
-    /// Everything within `radius` of a point.
+    /// Extent of the ball of `radius` around a point.
     fn ball(&self, p: Vec3, radius: f64) -> Shadow {
         let a = p.as_dvec3() - self.ray.origin.as_dvec3();
         let (x, y, z) = (a[self.ray.x], a[self.ray.y], a[self.ray.z]);
@@ -86,22 +86,22 @@ impl<'r> Turn<'r> {
 }
 
 impl<'a> Transformed<'a> {
-    /// Nothing to build.
+    /// Creates the structure; there is nothing to build.
     pub fn new(shapes: &'a Shapes) -> Self {
         Self { shapes }
     }
 
-    /// All zero but the references: every prim is listed once.
+    /// Sizes: all zero but the references, because every prim is listed once.
     pub fn summary(&self) -> StructureStats {
         StructureStats::listing(self.shapes.bounded())
     }
 
-    /// Nothing is built that could lose a hit.
+    /// Always succeeds: nothing is built that could lose a hit.
     pub fn check(&self) -> Result<StructureStats, String> {
         Ok(self.summary())
     }
 
-    /// What prim `prim` covers; spheres and cones are transformed here, as one and two points.
+    /// Extent of prim `prim`; spheres and cones are transformed here, as one and two points.
     fn shadow<P: Probe>(&self, prim: u32, turn: &Turn, corners: &[Shadow], probe: &mut P) -> Shadow {
         let join = |shadow: Shadow, i: &u32| shadow.join(corners[*i as usize]);
         let (triangles, polygons) = (&self.shapes.triangles, &self.shapes.polygons);

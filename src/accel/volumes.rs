@@ -1,11 +1,11 @@
 //! One bounding volume for each object: a ray that enters it is tested against every prim of the object.
 //!
-//! T. Whitted, *An Improved Illumination Model for Shaded Display*, 1980, with spheres; here spheres or boxes. An object is
-//! a run of faces of the file (see [`Shapes::objects`]), or a sphere or cone. A scene of one object is culled by nothing
-//! but the volume around all of it.
+//! T. Whitted, *An Improved Illumination Model for Shaded Display*, 1980, with spheres; here spheres or boxes. An object is a
+//! run of faces of the file (see [`Shapes::objects`]), or a sphere or cone. In a scene of one object only the volume around
+//! the whole scene culls.
 //!
 //! # Why no hit is lost
-//! Volumes hold all points of their prims: boxes are made of the prims' own bounds, and see [`BoundingSphere`].
+//! Volumes contain all points of their prims: boxes are unions of the prims' own bounds; for spheres see [`BoundingSphere`].
 
 use super::probe::{Extent, NodeId, Visit};
 use super::query::{Culling, Goal, Query};
@@ -17,28 +17,28 @@ use crate::math::aabb::Aabb;
 use crate::math::bounds::U64;
 use crate::math::{DVec3, Vec3};
 
-/// A kind of volume.
+/// Kind of bounding volume.
 pub trait Volume: Copy + std::fmt::Debug + Send + Sync {
-    /// What the volume tests of one ray share.
+    /// Data shared by the volume tests of one ray.
     type Ray;
 
-    /// The volume around some prims of `shapes`.
+    /// Computes the volume around some prims of `shapes`.
     fn around(shapes: &Shapes, prims: impl Iterator<Item = u32> + Clone) -> Self;
 
     /// Prepares the ray of a query.
     fn ray<G: Goal>(query: &Query<G>) -> Self::Ray;
 
-    /// Whether the ray is inside it anywhere before `limit`.
+    /// Whether the ray is inside the volume anywhere before `limit`.
     fn is_entered(&self, ray: &Self::Ray, limit: f64) -> bool;
 
-    /// Whether all of a prim is inside, as far as its corners or bounds tell.
+    /// Whether the volume contains all of a prim, judged by its corners or bounds.
     fn holds(&self, shapes: &Shapes, prim: u32) -> bool;
 
-    /// What it looks like.
+    /// Extent of the volume.
     fn extent(&self) -> Extent;
 }
 
-/// All objects with their volumes.
+/// All objects with their bounding volumes.
 #[derive(Clone, Debug)]
 pub struct Volumes<'a, V> {
     shapes: &'a Shapes,
@@ -46,13 +46,13 @@ pub struct Volumes<'a, V> {
 }
 
 impl<'a, V: Volume> Volumes<'a, V> {
-    /// Puts a volume around each object.
+    /// Computes the volume of each object.
     pub fn build(shapes: &'a Shapes) -> Self {
         let volumes = shapes.objects().into_iter().map(|o| (V::around(shapes, o.prims()), o)).collect();
         Self { shapes, volumes }
     }
 
-    /// Objects count as cells.
+    /// Sizes; objects count as cells.
     pub fn summary(&self) -> StructureStats {
         StructureStats {
             n_v: self.volumes.len() as u64,
@@ -62,7 +62,7 @@ impl<'a, V: Volume> Volumes<'a, V> {
         }
     }
 
-    /// Visits everything: each bounded prim is in one object, whose volume holds it.
+    /// Visits everything: each bounded prim is in exactly one object, whose volume contains it.
     pub fn check(&self) -> Result<StructureStats, String> {
         let mut objects = vec![0u32; self.shapes.bounded() as usize];
         for (volume, object) in &self.volumes {
@@ -129,22 +129,22 @@ impl Volume for Aabb {
     }
 }
 
-/// A bounding sphere around the middle of the prims' box.
+/// Bounding sphere around the centre of the prims' box.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundingSphere {
     center: DVec3,
     radius: f64,
 }
 
-/// How much larger than computed a ball is: a distance from the centre errs by 4 u.
+/// Enlargement factor of a ball: a distance from the centre errs by 4 u.
 const ROOM: f64 = 1.0 + 8.0 * U64;
 
-/// How far from the exact one the point of a ray that is nearest to the centre may be, and its distance, relative to the
-/// distance of the centre from the origin: 8 u from the projection, as for spheres (`math::sphere`). That much is also what
-/// a sphere's own test errs by. Eight times over.
+/// Bound, relative to the distance of the centre from the ray's origin, of the error of the ray's point nearest to the
+/// centre, and of its distance: 8 u from the projection, as for spheres (`math::sphere`). A sphere's own test errs by as
+/// much. Eight times over.
 const PLACE: f64 = 64.0 * U64;
 
-/// A ray and its widened beginning.
+/// A ray, and the widened start of its range.
 #[derive(Clone, Copy, Debug)]
 pub struct BallRay {
     origin: DVec3,
@@ -175,7 +175,7 @@ impl Volume for BoundingSphere {
         if distance > radius {
             return false;
         }
-        // A ball that overflowed is entered.
+        // A ball that overflowed counts as entered.
         let half = ((radius * radius - distance * distance) / speed2).sqrt() + slack / speed2.sqrt();
         let beyond = t - half > limit;
         let before = t + half < ray.from;
@@ -191,8 +191,8 @@ impl Volume for BoundingSphere {
     }
 }
 
-/// The distance from a point to the farthest of a prim: of its corners, of a sphere, of the box of a cone, or of a polygon,
-/// which may be hit anywhere in it as its corners need not lie in one plane.
+/// Largest distance from a point to a prim: to its corners, to a sphere, to the box of a cone, or to that of a polygon, which
+/// may be hit anywhere in it because its corners need not be coplanar.
 fn reach(shapes: &Shapes, prim: u32, from: DVec3) -> f64 {
     let distance = |p: Vec3| (p.as_dvec3() - from).length();
     match shapes.prim(prim) {

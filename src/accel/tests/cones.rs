@@ -1,10 +1,10 @@
-//! What leaves a cone: rays that start on the mantle do not meet it again.
+//! Rays that leave a cone: those that start on the mantle do not hit it again there.
 
 use super::*;
 use crate::math::bounds::offset_origin;
 use crate::math::random::Random;
 
-/// Rays aimed at one cone, as shapes of its own.
+/// Rays aimed at a cone, and the cone as shapes of its own.
 fn aimed(cone: Cone, n: usize, r: &mut Random) -> (Shapes, Vec<Ray>) {
     let shapes = Shapes { cones: vec![cone], opaque: BitSet::filled(1, true), ..Shapes::default() };
     let size = cone.apex.distance(cone.base) + cone.base_radius;
@@ -29,7 +29,7 @@ fn some_cones() -> Vec<Cone> {
         let apex_radius = [base_radius, 0.0, 0.3 * base_radius][i % 3];
         cones.push(Cone { base: r.cube(), base_radius, apex: r.cube() * 3.0, apex_radius });
     }
-    // Wide ones whose mantle passes by the origin of the frame: what was rounded on the way is larger than the place.
+    // Wide cones whose mantle passes near the origin of the frame: intermediate rounding errors exceed the position itself.
     for i in 0..20 {
         let side = r.cube().normalize_or(Vec3::X);
         let (along, across) = side.any_orthonormal_pair();
@@ -57,7 +57,7 @@ fn rays_that_leave_a_cone_do_not_meet_it_where_they_start() {
                 let origin = offset_origin(refined.start, refined.error, refined.normal, dir);
                 let Some(space) = RaySpace::new(origin, dir) else { continue };
                 let ahead = shapes.other_distances(0, &space, true).into_iter().filter(|t| *t >= 0.0).count();
-                // The solid is convex: outwards nothing, inwards the other side at most.
+                // The solid is convex: a ray outwards hits nothing, a ray inwards at most the other side.
                 let most = if slope > 1e-3 { 0 } else { 1 };
                 assert!(ahead <= most || slope.abs() < 1e-3, "{ahead} hits from {origin} to {dir} off {cone:?}");
                 checked += usize::from(slope.abs() > 1e-3);
@@ -79,7 +79,7 @@ fn a_refined_hit_lies_on_the_mantle_within_its_error() {
             let (arm, ..) = cone.project(refined.position.as_dvec3());
             let off = (cone.base.as_dvec3() + arm - refined.position.as_dvec3()).length();
             assert!(off <= refined.error.as_dvec3().length(), "{off} of {} on {cone:?}", refined.error);
-            // And where the ray says, to the rounding of its distance.
+            // And near the point of the ray at the hit's distance, up to the rounding of that distance.
             let on_ray = ray.origin + ray.dir * hit.t;
             let room = (ray.origin.abs() + on_ray.abs()).max_element() * 1e-5;
             assert!((on_ray - refined.position).length() < room, "{on_ray} {} {cone:?}", refined.position);
@@ -89,8 +89,8 @@ fn a_refined_hit_lies_on_the_mantle_within_its_error() {
 
 #[test]
 fn what_projecting_rounds_is_part_of_the_error() {
-    // A large tilted cylinder that passes through the origin exactly: there the position's own rounding is next to
-    // nothing, and what was rounded on the way is all there is.
+    // A large tilted cylinder that passes exactly through the origin: there the position's own rounding is next to nothing,
+    // and only the intermediate rounding errors remain.
     let at = |x: f32, z: f32| Vec3::new(x, 0.0, z) * 16384.0;
     let cone = Cone { base: at(-7.0, -1.0), base_radius: 81920.0, apex: at(-1.0, 7.0), apex_radius: 81920.0 };
     let shapes = Shapes { cones: vec![cone], opaque: BitSet::filled(1, true), ..Shapes::default() };
@@ -102,7 +102,7 @@ fn what_projecting_rounds_is_part_of_the_error() {
         let refined = shapes.refine(ray, hit);
         let p = refined.position.as_dvec3();
         assert!(p.length() < 1e-4, "{p}");
-        // The distance from the axis less the radius, where outwards is (4, 0, −3) / 5.
+        // Distance from the axis minus the radius, where outwards is (4, 0, −3) / 5.
         let out = (4.0 * p.x - 3.0 * p.z) / 5.0;
         let off = (out + p.y * p.y / (2.0 * 81920.0)).abs();
         assert!(off <= refined.error.as_dvec3().length(), "{off:e} of {}", refined.error);

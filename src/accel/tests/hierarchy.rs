@@ -1,4 +1,4 @@
-//! The binary hierarchy, judged by counts.
+//! Tests of the binary hierarchy by counts.
 
 use super::*;
 
@@ -16,7 +16,7 @@ fn the_nearer_child_is_visited_first_whichever_way_the_ray_runs() {
     let shapes = scenes::mesh(vertices, (0..4).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect());
     for ray in [scenes::ray(Vec3::new(0.2, 0.2, -1.0), Vec3::Z), scenes::ray(Vec3::new(0.2, 0.2, 4.0), Vec3::NEG_Z)] {
         let counts = count(&shapes, 1, &[ray]);
-        // The root's box, then two boxes at each of two levels; the others begin beyond the hit.
+        // The root's box, then two boxes at each of two levels; the other boxes begin beyond the hit.
         assert_eq!((counts.n_it, counts.n_bit, counts.n_ts, counts.n_ets), (1, 5, 3, 1));
     }
 }

@@ -1,11 +1,11 @@
-//! Mailboxes, judged by counts.
+//! Tests of the mailboxes by counts.
 
 use std::collections::HashSet;
 
 use super::*;
 use crate::accel::grid::mailbox::{AnyMailbox, Mailbox};
 
-/// Remembers what it was asked and answers as if it did not.
+/// Mailbox that records visits but answers as if it remembered nothing.
 #[derive(Debug, Default)]
 struct Recorder {
     prims: HashSet<u32>,
@@ -32,7 +32,7 @@ fn counts<M: Mailbox>(grid: &GridOctree<M>, ray: &Ray, scratch: &mut <GridOctree
     counts
 }
 
-/// Long thin triangles from one side of the scene to the other, each in many cells.
+/// Long thin triangles across the scene, each in many cells.
 fn slivers() -> Shapes {
     let mut r = Random::new(31);
     let mut vertices = Vec::new();
@@ -88,11 +88,11 @@ fn where_prims_are_long_mailboxes_save_most_tests_and_the_small_one_nearly_as_ma
     assert!(exact.n_it < hashed.n_it && hashed.n_it * 10 < exact.n_it * 11, "{exact:?} {hashed:?}");
 }
 
-/// A test in the first cell decides for all of them: what it finds in a later cell is kept, and stands if nothing comes
-/// before it there.
+/// The test in the first cell counts for all cells of a prim: its hit in a later cell is kept, and stands unless another hit
+/// precedes it.
 #[test]
 fn a_prim_in_many_cells_is_tested_in_the_first_and_hit_in_a_later_one() {
-    // A wall that leans away from the ray, through all cells, and small things that make the grid fine.
+    // A wall that leans away from the ray, through all cells, and small triangles that make the grid fine.
     let mut vertices = vec![Vec3::new(-1.0, -1.0, 0.1), Vec3::new(9.0, -1.0, 0.1), Vec3::new(4.0, 1.0, -0.1)];
     for i in 0..40 {
         let at = Vec3::new(0.2 * i as f32, 0.9, 0.9);

@@ -1,4 +1,4 @@
-//! What every structure must do.
+//! Tests that every structure must pass.
 
 mod catalogue;
 mod cones;
@@ -25,7 +25,7 @@ const PARAMS: [GridParams; 5] = [
     GridParams { dims: Some([1, 2, 1]), max_depth: 5, leaf_size: Some(1), assign: Assign::Box, ..GridParams::DEFAULT },
 ];
 
-/// Prims that are not opaque stop every third ray, each another third.
+/// Filter by which a prim that is not opaque blocks every third ray, depending on the prim's number.
 pub(crate) struct Sieve;
 
 impl OccludedFilter for Sieve {
@@ -34,7 +34,8 @@ impl OccludedFilter for Sieve {
     }
 }
 
-/// All hits of the three queries, what is blocked by what is opaque, and through [`Sieve`], as bits.
+/// Answers of all queries as bits: first hit, occlusion by opaque prims, the hit after the first, and occlusion through
+/// [`Sieve`].
 pub(crate) fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 10]> {
     let mut scratch = accel.scratch();
     let mut first = vec![Hit::MISS; rays.len()];
@@ -52,13 +53,13 @@ pub(crate) fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 10]> {
     first.iter().zip(&occluded).zip(&second).zip(&stopped).map(row).collect()
 }
 
-/// How many rays are answered otherwise than by brute force.
+/// Number of rays whose answers differ from brute force.
 pub(crate) fn wrong<A: Accel>(accel: &A, shapes: &Shapes, rays: &[Ray]) -> usize {
     let expected = answers(&Unculled::new(shapes), rays);
     answers(accel, rays).iter().zip(&expected).filter(|(got, expected)| got != expected).count()
 }
 
-/// `n` rays that start so many times the size of a mesh away from it, at every distance alike, towards its corners.
+/// `n` rays towards corners of a mesh, from a distance of `times` its size, log-uniformly distributed.
 pub(crate) fn far_rays(shapes: &Shapes, n: usize, times: std::ops::Range<f32>) -> Vec<Ray> {
     let mut r = Random::new(12);
     let size = shapes.vertices.iter().fold(0.0, |m: f32, v| m.max(v.abs().max_element()));
@@ -139,7 +140,7 @@ fn every_wide_tree_agrees_with_brute_force_bit_for_bit_on_every_instruction_set(
     for (name, shapes) in all() {
         let rays = rays(&shapes, 100);
         let expected = answers(&Unculled::new(&shapes), &rays);
-        // Cut as large scenes are, so that planes of cells go all the way down, and as small ones.
+        // Split like large scenes, with octree planes all the way down, and like small ones.
         let trees = [(Splitting::Octree, ALIKE), (Splitting::Octree, 1), (Splitting::SurfaceArea, 1)];
         for (splitting, times) in trees {
             let tree = Wide::build_sample(&shapes, splitting, times);

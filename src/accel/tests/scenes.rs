@@ -1,4 +1,4 @@
-//! Generated shapes and rays, the same in every run.
+//! Generated shapes and rays, identical in every run.
 
 use crate::accel::{BitSet, Cone, NO_PRIM, Ray, Shapes, SpherePrim};
 use crate::math::Vec3;
@@ -9,7 +9,7 @@ pub(crate) fn mesh(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Shapes {
     seal(Shapes { vertices, triangles, ..Shapes::default() })
 }
 
-/// Every third prim lets light through.
+/// Makes every third prim non-opaque.
 pub(crate) fn seal(mut shapes: Shapes) -> Shapes {
     shapes.opaque = BitSet::filled(shapes.len(), true);
     for i in (0..shapes.len() as u32).step_by(3) {
@@ -18,7 +18,7 @@ pub(crate) fn seal(mut shapes: Shapes) -> Shapes {
     shapes
 }
 
-/// Triangles anywhere, of many sizes.
+/// Random triangles of many sizes.
 pub(crate) fn soup(n: u32, size: f32) -> Shapes {
     let mut r = Random::new(1);
     let mut vertices = Vec::new();
@@ -32,7 +32,7 @@ pub(crate) fn soup(n: u32, size: f32) -> Shapes {
     mesh(vertices, (0..n).map(|i| [i * 3, i * 3 + 1, i * 3 + 2]).collect())
 }
 
-/// [`bench::star`](crate::bench::star) with prims that let light through.
+/// [`bench::star`](crate::bench::star) with some prims that are not opaque.
 pub(crate) fn star(columns: u32, rows: u32) -> Shapes {
     seal(crate::bench::star::star(columns, rows))
 }
@@ -88,7 +88,7 @@ pub(crate) fn mix() -> Shapes {
     seal(shapes)
 }
 
-/// Cones and cylinders alone: in the axes and across, from needles to discs, around one another, and one huge.
+/// Cones and cylinders alone: parallel to the axes and oblique, from needles to discs, nested, and a huge one.
 pub(crate) fn pipes() -> Shapes {
     let mut r = Random::new(6);
     let mut shapes = Shapes::default();
@@ -116,12 +116,12 @@ pub(crate) fn huge_and_tiny() -> Shapes {
     seal(shapes)
 }
 
-/// `n` times the same triangle.
+/// `n` copies of the same triangle.
 pub(crate) fn copies(n: usize) -> Shapes {
     mesh(vec![Vec3::ZERO, Vec3::X, Vec3::new(0.3, 0.9, 0.2)], vec![[0, 1, 2]; n])
 }
 
-/// All vertices scaled, then moved.
+/// Scales all vertices, then moves them.
 pub(crate) fn moved(mut shapes: Shapes, scale: f32, offset: Vec3) -> Shapes {
     for v in &mut shapes.vertices {
         *v = *v * scale + offset;
@@ -170,7 +170,7 @@ pub(crate) fn all() -> Vec<(&'static str, Shapes)> {
     ]
 }
 
-/// `n` rays of each kind that is hard on a scene.
+/// `n` rays of each kind that is difficult for a scene.
 pub(crate) fn rays(shapes: &Shapes, n: usize) -> Vec<Ray> {
     let mut r = Random::new(5);
     let fallback = [Vec3::ZERO, Vec3::X, Vec3::Y];
@@ -178,7 +178,7 @@ pub(crate) fn rays(shapes: &Shapes, n: usize) -> Vec<Ray> {
     let Aabb { lo, hi } = Aabb::around(shapes.vertices.iter().copied().chain(ends));
     let (lo, hi) = if lo.x <= hi.x { (lo, hi) } else { (Vec3::NEG_ONE, Vec3::ONE) };
     let (middle, half) = (lo * 0.5 + hi * 0.5, (hi * 0.5 - lo * 0.5).max(Vec3::splat(1e-44)));
-    // Of a cone: a point of its rim, its apex and one beside it.
+    // Of a cone: a point of its rim, its apex, and one beside it.
     let of_cone = |c: &Cone| {
         let out = (c.apex - c.base).any_orthonormal_vector();
         [c.base + out * c.base_radius, c.apex, c.apex + out * c.apex_radius]
@@ -217,7 +217,7 @@ pub(crate) fn rays(shapes: &Shapes, n: usize) -> Vec<Ray> {
             ray(a - tiny * half * 2.0, tiny),
         ]);
     }
-    // Some with ranges and exclusions.
+    // Some rays get ranges and exclusions.
     for (i, ray) in rays.iter_mut().enumerate() {
         match i % 7 {
             3 => ray.t_min = r.unit(),
@@ -234,7 +234,7 @@ pub(crate) fn ray(origin: Vec3, dir: Vec3) -> Ray {
     Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 }
 }
 
-/// Rays that cannot hit.
+/// Rays that cannot hit anything.
 pub(crate) fn broken_rays() -> Vec<Ray> {
     let good = ray(Vec3::ZERO, Vec3::X);
     let mut rays = vec![

@@ -1,4 +1,4 @@
-//! Rays that start on a surface: they neither hit what they start on nor slip through what is beside it.
+//! Rays that start on a surface: they neither hit the face they start on nor slip through neighbouring faces.
 
 use super::scenes::{mesh, ray};
 use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, NoProbe, Ray, Shapes};
@@ -6,7 +6,7 @@ use crate::math::Vec3;
 use crate::math::random::Random;
 use crate::math::triangle;
 
-/// What is asked of one mesh.
+/// A mesh with a structure over it.
 struct Surface<'a> {
     shapes: &'a Shapes,
     accel: AnyAccel<'a>,
@@ -23,7 +23,7 @@ impl<'a> Surface<'a> {
         hit[0]
     }
 
-    /// The ray towards `dir` from where another ray hits.
+    /// Ray towards `dir` from the hit of another ray.
     fn leave(&self, from: &Ray, hit: &Hit, dir: Vec3) -> Ray {
         Ray { exclude: hit.prim, ..ray(self.shapes.refine(from, hit).origin(dir), dir) }
     }
@@ -34,7 +34,7 @@ impl<'a> Surface<'a> {
         occluded[0]
     }
 
-    /// Places of hits on the way of a ray.
+    /// Number of points at which a ray crosses the surface.
     fn crossings(&self, ray: &Ray) -> usize {
         let (mut hit, mut count) = (self.closest(ray), 0);
         while hit.is_some() {
@@ -42,7 +42,7 @@ impl<'a> Surface<'a> {
             let before = [hit];
             let mut next = [hit];
             self.accel.next(&[*ray], &before, &mut next, &mut self.accel.scratch(), &mut NoProbe);
-            // At an edge two faces are hit at once.
+            // At an edge two faces are hit at the same distance.
             while next[0].is_some() && next[0].t == hit.t {
                 let before = next;
                 self.accel.next(&[*ray], &before, &mut next, &mut self.accel.scratch(), &mut NoProbe);
@@ -58,7 +58,7 @@ fn opaque(mut shapes: Shapes) -> Shapes {
     shapes
 }
 
-/// `n` × `n` squares of side `cell` whose corner (i, j) is at height `z(i, j)`, moved.
+/// `n` × `n` squares of side `cell` with corner (i, j) at height `z(i, j)`, moved by `offset`.
 fn grid(n: u32, cell: f32, offset: Vec3, z: impl Fn(u32, u32) -> f32) -> Shapes {
     let corners = (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j)));
     let vertices = corners.map(|(i, j)| Vec3::new(i as f32 * cell, j as f32 * cell, z(i, j)) + offset).collect();
@@ -69,7 +69,8 @@ fn grid(n: u32, cell: f32, offset: Vec3, z: impl Fn(u32, u32) -> f32) -> Shapes 
     opaque(mesh(vertices, triangles))
 }
 
-/// Pixels of a grid seen from above that a light just above its horizon does not reach: corners, edges and faces alike.
+/// Counts the pixels of a grid seen from above, and those that a light just above its horizon does not reach, at corners,
+/// edges and faces.
 fn shadowed(shapes: &Shapes, cell: f32, up: Vec3) -> (usize, usize) {
     let surface = Surface::new(shapes);
     let (lo, hi) =
@@ -80,7 +81,7 @@ fn shadowed(shapes: &Shapes, cell: f32, up: Vec3) -> (usize, usize) {
     for pixel in 0..3000 {
         let steps = ((hi - lo) / cell).map(f32::floor);
         let lattice = Vec3::new(random.unit() * steps.x, random.unit() * steps.y, 0.0);
-        // On corners of the squares, on their edges, and anywhere.
+        // On corners of the squares, on their edges, and at random.
         let place = match pixel % 3 {
             0 => lattice.map(f32::round),
             1 => Vec3::new(lattice.x.round(), lattice.y, 0.0),
@@ -108,14 +109,14 @@ fn no_part_of_a_surface_in_grazing_light_shadows_itself() {
     let ripples = |i: u32, j: u32| ((i * 7 + j * 13) % 11) as f32 * 5e-5;
     for (name, offset) in [("as it is", 0.0), ("1e3 away", 1e3), ("1e5 away", 1e5), ("1e7 away", 1e7)] {
         let offset = Vec3::new(offset, offset * 0.5, -offset);
-        // Large enough that its corners are where they should be, even there.
+        // Large enough that its corners are accurate even at that offset.
         let flat = grid(16, 64.0, offset, |_, _| 0.0);
         assert_eq!(shadowed(&flat, 64.0, Vec3::Z).1, 0, "flat, {name}");
         let tilted = grid(16, 64.0, offset, |i, j| 16.0 * i as f32 + 32.0 * j as f32);
         let up = triangle::normal(&tilted.triangle(0));
         let (seen, dark) = shadowed(&tilted, 64.0, up);
         assert!(seen > 2500 && dark == 0, "tilted, {name}: {dark} of {seen}");
-        // Slopes below the light's height: every point sees it. Moved by a transform, the frame is centred again.
+        // Slopes below the light's height: every point sees it. When a transform moves the mesh, its frame is centred again.
         if offset == Vec3::ZERO {
             let rippled = grid(16, 1.0, offset, ripples);
             let (seen, dark) = shadowed(&rippled, 1.0, Vec3::Z);
@@ -157,7 +158,7 @@ fn star_at(center: Vec3, half: Vec3) -> Shapes {
     Shapes { vertices: star.vertices.iter().map(|p| center + *p * half).collect(), ..star }
 }
 
-/// Whether light from outside reaches a place that is seen from inside.
+/// Whether light from outside reaches a point that is seen from inside.
 fn leaks(surface: &Surface, center: Vec3, half: Vec3, i: usize, random: &mut Random) -> bool {
     let [a, b, c] = surface.shapes.triangle(random.below(surface.shapes.triangles.len()) as u32);
     let target = match i % 4 {
@@ -177,10 +178,10 @@ fn leaks(surface: &Surface, center: Vec3, half: Vec3, i: usize, random: &mut Ran
     let to_light = light - position;
     let normal = triangle::normal(&surface.shapes.triangle(hit.prim));
     let facing = normal.dot(to_light.normalize());
-    // A surface gets no light from behind, and no ray asks for it. Nor does it along itself, where the rounded normal
-    // does not tell one side from the other: less than a millionth of the light.
+    // A surface gets no light from behind, and no shadow ray is traced there; nor along the surface, where the rounded normal
+    // does not separate the sides: less than a millionth of the light.
     let same_side = facing * normal.dot(eye.dir) < 0.0;
-    // Exactly at an edge behind which a face turns away, it is the outside of that face that is seen.
+    // Exactly at an edge behind which a face turns away, the eye sees the outside of that face.
     let from_inside = normal.dot(eye.dir) > 0.0;
     from_inside && same_side && facing.abs() > 1e-6 && !surface.is_occluded(&surface.leave(&eye, &hit, to_light))
 }
@@ -224,12 +225,12 @@ fn a_ray_that_leaves_a_convex_mesh_is_free_and_one_that_enters_it_crosses_it_onc
     }
 }
 
-/// S4 (gaps).
+/// S4 (narrow gaps).
 #[test]
 fn a_gap_of_sixteen_units_in_the_last_place_is_resolved() {
     for tilt in [0.0, 0.25, 1.0] {
         for k in 0..6 {
-            // Heights in 1..2, where a unit in the last place is 2⁻²³.
+            // Heights in 1..2, where an ulp is 2⁻²³.
             let gap = 16.0 * f32::EPSILON * (1 << k) as f32;
             let slope = |i: u32| 1.0 + tilt * i as f32 / 8.0;
             let lower = grid(4, 0.125, Vec3::ZERO, |i, _| slope(i));
@@ -241,7 +242,7 @@ fn a_gap_of_sixteen_units_in_the_last_place_is_resolved() {
             let surface = Surface::new(&shapes);
             let mut random = Random::new(2);
             for _ in 0..500 {
-                // From below, so that the lower one is hit first.
+                // From below, so that the lower grid is hit first.
                 let at = Vec3::new(random.unit() * 0.5, random.unit() * 0.5, 0.0);
                 let (under, above) = (ray(at, Vec3::Z), ray(at + Vec3::Z * 4.0, Vec3::NEG_Z));
                 let (low, high) = (surface.closest(&under), surface.closest(&above));

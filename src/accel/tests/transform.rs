@@ -1,4 +1,4 @@
-//! The scene turned for each ray, judged by counts.
+//! Tests of the transformed scene by counts.
 
 use super::*;
 
@@ -20,7 +20,7 @@ fn every_corner_is_transformed_once_for_each_ray_and_other_prims_by_their_points
 #[test]
 fn only_what_straddles_the_ray_is_tested_nearest_first_and_not_beyond_the_hit() {
     let at = |x: f32, z: f32| [Vec3::new(x, 0.0, z), Vec3::new(x + 1.0, 0.0, z), Vec3::new(x, 1.0, z)];
-    // The farther one has the lower number; others lie beside the ray, or straddle it and are missed.
+    // The farther face has the lower prim number; others lie beside the ray, or straddle it and are missed.
     let faces = [at(0.0, -5.0), at(0.0, -2.0), at(3.0, -1.0), at(-2.0, -1.0), at(-0.6, -1.0)];
     let shapes = scenes::mesh(faces.concat(), (0..5).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect());
     let (hit, counts) = count(&shapes, scenes::ray(Vec3::new(0.2, 0.7, 0.0), Vec3::NEG_Z));

@@ -1,4 +1,4 @@
-//! One volume for each object, judged by counts.
+//! Tests of the bounding volumes of objects by counts.
 
 use super::*;
 use crate::accel::probe::Extent;
@@ -11,22 +11,22 @@ fn counts<A: Accel>(accel: &A, rays: &[Ray]) -> RayCounts {
     counts
 }
 
-/// The rays of a camera of 128 × 128 pixels that looks past the origin; `width` is that of the picture at distance 1.
+/// Rays of a camera of 128 × 128 pixels that looks past the origin; `width` is the picture's width at distance 1.
 fn picture(width: f32) -> Vec<Ray> {
     let at = |i: usize| (i as f32 + 0.5) / 128.0 - 0.5;
     let pixel = |i: usize| Vec3::new(width * at(i % 128) + 0.0123, width * at(i / 128) - 0.0217, -1.0);
     (0..128 * 128).map(|i| scenes::ray(Vec3::Z * 6.0, pixel(i))).collect()
 }
 
-/// The worked example of a lecture on ray tracing: 128 × 128 rays, one object of 46 polygons, and an eighth of the rays
-/// enter its volume: 753,664 tests without it, 16,384 and 94,208 with it.
+/// A lecture's worked example: 128 × 128 rays, one object of 46 polygons, an eighth of the rays enter its volume: 753,664
+/// tests without the volume, 16,384 and 94,208 with it.
 #[test]
 fn a_sphere_around_46_polygons_that_an_eighth_of_the_rays_enter_saves_six_tests_of_seven() {
     let shapes = crate::bench::star::star(23, 2);
     assert_eq!((shapes.len(), shapes.objects().len()), (46, 1));
     let spheres = Volumes::<BoundingSphere>::build(&shapes);
 
-    // The wider the picture, the fewer rays enter; one after the other, as the camera looks past the middle.
+    // The wider the picture, the fewer rays enter, one at a time, because the camera looks past the middle.
     let entered = |width| counts(&spheres, &picture(width)).n_ets;
     let (mut narrow, mut wide) = (0.5, 4.0);
     let mut width = 1.0;
@@ -49,7 +49,7 @@ fn a_sphere_around_46_polygons_that_an_eighth_of_the_rays_enter_saves_six_tests_
     assert_eq!(with.found, without.found);
 }
 
-/// A polygon that is not quite flat is hit anywhere in its box.
+/// A polygon that is not quite flat may be hit anywhere in its box.
 #[test]
 fn a_sphere_around_a_polygon_holds_its_box() {
     let vertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.01], [0.0, 1.0, 0.0]].map(Vec3::from).to_vec();
@@ -61,7 +61,7 @@ fn a_sphere_around_a_polygon_holds_its_box() {
     }
 }
 
-/// Four separate clusters, three of them runs and one of a triangle.
+/// Four separate clusters: three runs of faces and a single triangle.
 fn clusters() -> Shapes {
     let mut shapes = scenes::soup(91, 0.3);
     for (i, v) in shapes.vertices.iter_mut().enumerate() {
@@ -89,7 +89,7 @@ fn only_objects_whose_volume_is_entered_are_tested() {
     only_entered_objects_are_tested::<Aabb>(&clusters());
 }
 
-/// Corners on the sphere itself, rays exactly through them: they must not miss it by rounding.
+/// Corners on the sphere itself, with rays exactly through them: rounding must not make a ray miss the sphere.
 #[test]
 fn a_ray_that_touches_a_volume_enters_it() {
     let mut r = Random::new(51);

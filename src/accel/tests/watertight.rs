@@ -1,4 +1,4 @@
-//! Closed meshes let nothing out.
+//! Closed meshes let no ray out.
 
 use super::scenes::{ray, star};
 use crate::accel::*;
@@ -54,7 +54,7 @@ fn no_ray_aimed_at_corners_and_edges_escapes_from_a_closed_mesh() {
 
 #[test]
 fn no_ray_through_a_corner_or_edge_of_a_lattice_escapes() {
-    // A closed box of unit squares; every ray runs exactly through lattice points.
+    // A closed box of unit squares; every ray passes exactly through lattice points.
     let mut shapes = Shapes::default();
     for axis in 0..3 {
         for (side, u, v) in (0..2).flat_map(|s| (0..4).flat_map(move |u| (0..4).map(move |v| (s, u, v)))) {

@@ -1,7 +1,8 @@
-//! The best hit of a ray so far, known by an interval: most hits need no more to be told from each other.
+//! Best hit of a ray so far, known by an interval: most hits can be ordered by intervals alone.
 //!
-//! Exact distances are dear. Where the intervals of two hits do not touch, the nearer is known without them, and only the
-//! hit that is left at the end needs its own; where they do, or touch an end of the ray's range, the exact test decides.
+//! Exact distances are expensive. Where the intervals of two hits are disjoint, the nearer hit is known without them, and
+//! only the final hit needs its exact distance; where they overlap, or touch an end of the ray's range, the exact test
+//! decides.
 
 use super::node::{Child, Tree};
 use super::prepared::PreparedRay;
@@ -16,34 +17,34 @@ use crate::math::simd::{LANES, Row, Simd};
 use crate::math::triangle::{self, Triangle};
 use crate::math::triangles::{Corners8, corners_of};
 
-/// What a ray looks for, and what it has found.
+/// A ray's query state and its best hit so far.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seeker {
-    /// Its number in the batch.
+    /// Index of the ray in its batch.
     pub number: usize,
-    /// Boxes are entered up to here.
+    /// Distance up to which boxes are entered.
     pub limit: f32,
     t_min: f32,
     exclude: u32,
     best: Best,
 }
 
-/// A hit by an interval.
+/// A hit known by an interval.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Best {
-    /// Its exact distance lies between these. Without a hit: infinite, and the end of the ray's range.
+    /// Bounds of the exact distance. Without a hit: infinite, and the end of the ray's range.
     pub low: f32,
     pub high: f32,
     pub place: TriangleSlot,
 }
 
-/// What a ray meets of a block.
+/// Hits of a ray in a block.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BlockHits {
-    /// Between which distances, where that is certain.
+    /// Bounds of the distances, valid for certain hits.
     low: Row,
     high: Row,
-    /// Lanes that are hit for certain, and those of the others that may be, too.
+    /// Bit masks of the lanes hit for certain, and of these and the lanes that may be hit.
     hit: u32,
     pub open: u32,
 }
@@ -52,7 +53,7 @@ impl BlockHits {
     pub(super) const NOTHING: Self = Self { low: [0.0; LANES], high: [0.0; LANES], hit: 0, open: 0 };
 }
 
-/// The first lanes.
+/// Bit mask of the first `count` lanes.
 #[inline(always)]
 fn lanes(count: u32) -> u32 {
     (1 << count) - 1
@@ -63,32 +64,32 @@ fn lanes(count: u32) -> u32 {
 pub(super) struct TriangleSlot {
     pub block: u32,
     pub lane: u32,
-    /// [`NO_PRIM`] where there is none.
+    /// [`NO_PRIM`] if there is no triangle.
     pub prim: u32,
 }
 
 impl TriangleSlot {
     const NONE: Self = Self { block: 0, lane: 0, prim: NO_PRIM };
 
-    /// Block and lane in a word; there are fewer than 2²⁷ blocks.
+    /// Block and lane packed in a word; there are fewer than 2²⁷ blocks.
     #[inline(always)]
     pub(super) fn packed(self) -> u32 {
         self.block << 3 | self.lane
     }
 
-    /// The place that was packed, of this triangle.
+    /// Unpacks the slot of triangle `prim`.
     #[inline(always)]
     pub(super) fn unpacked(packed: u32, prim: u32) -> Self {
         Self { block: packed >> 3, lane: packed % LANES as u32, prim }
     }
 
-    /// The corners in the block of a packed place, and its lane.
+    /// Corners of the block of a packed slot, and the lane.
     #[inline(always)]
     pub(super) fn rows<'a>(tree: &Tree<'a>, packed: u32) -> (&'a Corners8, usize) {
         (&tree.blocks[(packed >> 3) as usize].corners, packed as usize % LANES)
     }
 
-    /// The corners of a triangle by its packed place.
+    /// Corners of the triangle in a packed slot.
     #[inline(always)]
     pub(super) fn corners(tree: &Tree, packed: u32) -> Triangle {
         let (rows, lane) = Self::rows(tree, packed);
@@ -97,7 +98,7 @@ impl TriangleSlot {
 }
 
 impl Seeker {
-    /// A ray that was made ready, whose hits count from `t_min` on, of this number in its batch.
+    /// Creates the state of a prepared ray with index `number` in its batch, whose hits count from `t_min` on.
     #[inline(always)]
     pub(super) fn new(ray: &PreparedRay, t_min: f32, number: usize, exclude: u32) -> Self {
         Self {
@@ -109,13 +110,13 @@ impl Seeker {
         }
     }
 
-    /// The hit that is left.
+    /// Slot of the final hit.
     #[inline(always)]
     pub(super) fn found(&self) -> TriangleSlot {
         self.best.place
     }
 
-    /// Tests the triangles of a leaf, a block, as the ray sees them, and tells whether nothing more can matter.
+    /// Tests the triangles of a block leaf as seen by the ray, and returns whether the query is answered.
     #[inline(always)]
     pub(super) fn test<B: BoxMargins, S: Simd, W: QueryBatch>(
         &mut self,
@@ -136,7 +137,7 @@ impl Seeker {
         met.open != 0 && self.take::<B, _>(tree, shapes, batch, index, &met)
     }
 
-    /// What is met of a leaf, whose index is below the number of blocks.
+    /// Hits of the ray in a leaf, whose index must be below the number of blocks.
     #[inline(always)]
     pub(super) fn meet<S: Simd>(&self, s: S, sight: &Sight, tree: &Tree, leaf: u32) -> BlockHits {
         let (index, count) = Child::block(leaf);
@@ -151,7 +152,7 @@ impl Seeker {
         BlockHits { low: s.store(low), high: s.store(high), hit, open: hit | unsure }
     }
 
-    /// Takes what is met of a block, and tells whether nothing more can matter.
+    /// Takes the hits of a block, and returns whether the query is answered.
     #[inline(always)]
     pub(super) fn take<B: BoxMargins, W: QueryBatch>(
         &mut self,
@@ -176,7 +177,7 @@ impl Seeker {
         false
     }
 
-    /// Takes a triangle that is hit between these distances, or may be hit; and tells whether that is the answer.
+    /// Takes a triangle that is hit within the given distances, or may be hit, and returns whether that answers the query.
     #[inline(always)]
     fn offer<W: QueryBatch>(
         &mut self,
@@ -212,15 +213,15 @@ impl Seeker {
     }
 }
 
-/// Whether a ray passes a prim that it meets, as one that is not there.
+/// Whether the filter lets the ray pass through a prim that it hits.
 #[cold]
 #[inline(never)]
 fn passes<W: QueryBatch>(shapes: &Shapes, batch: &W, i: usize, prim: u32) -> bool {
     !shapes.opaque.get_or_set(prim) && batch.filter().is_some_and(|filter| filter.rejects(i, prim))
 }
 
-/// Whether a triangle is hit before the best one so far, which was found by intervals, by the exact test; `certain`: it is on
-/// the ray's line. Then where, or a distance of negative infinity where any hit is the answer.
+/// Decides by the exact test whether a triangle is hit before the best hit so far, which was found by intervals; `certain`:
+/// the ray's line is known to hit it. Returns the distance, or negative infinity if any hit is the answer.
 #[cold]
 #[inline(never)]
 pub(super) fn decide<W: QueryBatch>(
@@ -245,7 +246,7 @@ pub(super) fn decide<W: QueryBatch>(
     if W::Goal::ANY {
         return Some(f32::NEG_INFINITY);
     }
-    // Rounding keeps the order, so that the exact distance of the best one lies between its bounds when rounded, too.
+    // Rounding is monotonic, so the rounded exact distance of the best hit lies between its bounds, too.
     let before = if t < best.low {
         true
     } else if t > best.high {

@@ -1,5 +1,5 @@
-//! Blocks as packets from one place see them, kept from packet to packet: those that follow each other visit the same
-//! leaves, and what is found of eight triangles before a ray is looked at is the same for all.
+//! Cache of blocks as seen by packets from one origin: consecutive packets visit the same leaves, and the data prepared from
+//! eight triangles before any ray is tested is the same for all of them.
 
 use super::node::Block;
 use crate::math::Vec3;
@@ -7,31 +7,31 @@ use crate::math::fan::{Fan, FanReady};
 use crate::math::sight::Rows;
 use crate::math::simd::{LANES, Lanewise, Row, Simd};
 
-/// Blocks that are kept, each in the place that its number says: as much as stays in the first cache beside a packet.
+/// Number of cached blocks, direct-mapped by their indices: as many as stay in the first-level cache beside a packet.
 const PLACES: usize = 16;
 
-/// No block.
+/// Marks an empty slot.
 const NONE: u32 = u32::MAX;
 
-/// From where blocks are seen: the origin, the main axis and the octant.
+/// Viewpoint of the cached blocks: origin, main axis and octant.
 type CacheKey = (Vec3, usize, usize);
 
-/// Blocks that were visited lately.
+/// Recently visited blocks.
 #[derive(Clone, Debug)]
 pub(super) struct BlockCache {
     key: CacheKey,
-    /// Which block is in a place.
+    /// Index of the block in each slot.
     blocks: [u32; PLACES],
     kept: Box<[CachedBlock; PLACES]>,
 }
 
-/// A block.
+/// A prepared block.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct CachedBlock {
-    /// The boxes of its triangles: planes in the order of a node's.
+    /// Boxes of its triangles: planes in the order of a node's.
     pub planes: [Row; 6],
-    /// What a fan sees of them.
+    /// Block data prepared for a fan.
     pub ready: FanReady,
 }
 
@@ -43,13 +43,13 @@ impl Default for BlockCache {
 }
 
 impl BlockCache {
-    /// Forgets all blocks.
+    /// Removes all blocks.
     #[inline(always)]
     pub(super) fn clear(&mut self) {
         self.blocks = [NONE; PLACES];
     }
 
-    /// From now on blocks are seen from here; those that were seen from elsewhere are forgotten.
+    /// Sets the viewpoint, and removes blocks prepared for another one.
     #[inline(always)]
     pub(super) fn sit(&mut self, key: CacheKey) {
         if self.key != key {
@@ -58,7 +58,7 @@ impl BlockCache {
         }
     }
 
-    /// Puts a block into its place, if it is not there.
+    /// Prepares a block in its slot, unless it is already there, and returns the slot.
     #[inline(always)]
     pub(super) fn place<S: Simd, T: Lanewise<N>, const N: usize>(
         &mut self,
@@ -81,7 +81,7 @@ impl BlockCache {
         place
     }
 
-    /// What is in a place.
+    /// Block in a slot.
     #[inline(always)]
     pub(super) fn at(&self, place: usize) -> &CachedBlock {
         &self.kept[place % PLACES]

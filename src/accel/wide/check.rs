@@ -1,4 +1,4 @@
-//! Proof that a built tree can lose no hit, and its sizes.
+//! Sizes of a built tree, and the proof that it can lose no hit.
 
 use super::Wide;
 use super::node::Child;
@@ -8,7 +8,7 @@ use crate::math::aabb::Aabb;
 use crate::math::simd::LANES;
 
 impl Wide<'_> {
-    /// Sizes, counted by visiting every node. Cells are leaves.
+    /// Counts the sizes by visiting every node. Cells are leaves.
     pub fn summary(&self) -> StructureStats {
         let mut stats = StructureStats {
             n_in: self.tree().nodes.len() as u64,
@@ -25,8 +25,8 @@ impl Wide<'_> {
         stats
     }
 
-    /// Visits everything: each bounded prim is in one leaf, the box of every slot holds all prims below it, blocks hold the
-    /// corners of their triangles, and the tree is as deep as it says, by which stacks are made.
+    /// Visits everything: each bounded prim is in exactly one leaf, the box of every slot contains all prims below it, blocks
+    /// hold the corners of their triangles, and the tree has its stated depth, which sizes the stacks.
     pub fn check(&self) -> Result<StructureStats, String> {
         let mut leaves = vec![0u32; self.shapes.bounded() as usize];
         let mut failure = None;
@@ -43,7 +43,7 @@ impl Wide<'_> {
         }
     }
 
-    /// The box of all prims below a node, exactly; counts their leaves.
+    /// Exact box of all prims below a node; counts the leaves of each prim.
     fn holds(&self, node: u32, leaves: &mut [u32], failure: &mut Option<String>) -> Aabb {
         let mut all = Aabb::EMPTY;
         for slot in 0..LANES {
@@ -81,7 +81,7 @@ impl Wide<'_> {
         Child::unpack(self.tree().nodes[node as usize].children[slot])
     }
 
-    /// The prims of a leaf.
+    /// Prims of a leaf.
     fn prims(&self, leaf: Child) -> &[u32] {
         match leaf {
             Child::Node(_) | Child::Block(_, 0) => &[],
@@ -90,7 +90,7 @@ impl Wide<'_> {
         }
     }
 
-    /// Every leaf with its depth below the root, its box and its prims.
+    /// Calls `found` with every leaf: its depth below the root, its box and its prims.
     fn each_leaf(&self, node: u32, depth: u32, found: &mut impl FnMut(u32, Aabb, &[u32])) {
         for slot in 0..LANES {
             match self.child(node, slot) {

@@ -1,22 +1,21 @@
-//! A binary tree as an array of build nodes, and while it grows.
+//! Binary tree as an array of build nodes, and the builder that grows it.
 
 use crate::math::Vec3;
 use crate::math::aabb::Aabb;
 use crate::parts::joined;
 use bytemuck::Zeroable;
 
-/// Pieces of no more build nodes are put together.
+/// Largest size of a piece to which another is appended, in build nodes.
 const PIECE: usize = 256;
 
-/// A node of the binary tree. They stand in an array, each followed by all that is below it, first side first.
+/// A node of the binary tree. In the array each is followed by its whole subtree, first side first.
 #[derive(Clone, Copy, Debug, Zeroable)]
 pub(super) struct BuildNode {
     pub lo: Vec3,
-    /// Of a leaf the first of its prims, in the end the packed child that it is; of another build node how many build nodes
-    /// further on its second side is.
+    /// Leaf: index of its first prim, finally its packed child. Inner build node: offset of its second side.
     pub at: u32,
     pub hi: Vec3,
-    /// Prims of a leaf; 0: no leaf.
+    /// Number of prims of a leaf; 0 marks an inner build node.
     pub count: u32,
 }
 
@@ -39,7 +38,7 @@ impl BuildNode {
         self.count > 0
     }
 
-    /// Half the surface of its box.
+    /// Half the surface area of the box.
     #[inline]
     pub(super) fn area(&self) -> f32 {
         let d = self.hi - self.lo;
@@ -47,20 +46,20 @@ impl BuildNode {
     }
 }
 
-/// A tree while it grows: its build nodes in their order, in pieces that are not moved until it is known how many there are.
+/// A growing tree: its build nodes in order, in pieces that are joined only when their total number is known.
 #[derive(Default)]
 pub(super) struct TreeBuilder {
     pieces: Vec<Vec<BuildNode>>,
-    /// The last piece, which build nodes are added to.
+    /// Last piece, to which build nodes are added.
     open: Vec<BuildNode>,
-    /// Build nodes above the next one.
+    /// Depth of the next build node: the number of build nodes above it.
     above: usize,
-    /// Build nodes on the longest way down.
+    /// Number of build nodes on the longest path.
     depth: usize,
 }
 
 impl TreeBuilder {
-    /// Begins below so many build nodes.
+    /// Starts below `above` build nodes.
     fn below(above: usize) -> Self {
         Self { above, ..Self::default() }
     }
@@ -69,7 +68,7 @@ impl TreeBuilder {
         self.pieces.iter().chain([&self.open]).map(Vec::len).sum()
     }
 
-    /// Adds a build node over what `first` and `second` add, of which neither shares its work with another thread.
+    /// Adds a build node over the subtrees that `first` and `second` add, both on this thread.
     pub(super) fn fork(&mut self, bounds: Aabb, first: impl FnOnce(&mut Self), second: impl FnOnce(&mut Self)) {
         let (at, pieces) = (self.open.len(), self.pieces.len());
         self.add(BuildNode::fork(bounds, 0));
@@ -81,7 +80,7 @@ impl TreeBuilder {
         debug_assert_eq!(pieces, self.pieces.len(), "a node that was not shared went to another piece");
     }
 
-    /// Adds a node with two sides, each built by a thread of its own.
+    /// Adds a build node with two sides, each built by a thread of its own.
     pub(super) fn fork_shared(
         &mut self,
         bounds: Aabb,
@@ -109,20 +108,20 @@ impl TreeBuilder {
         self.open.push(build_node);
     }
 
-    /// Makes room for so many build nodes where a piece begins.
+    /// Reserves memory for `build_nodes` build nodes if a piece begins here.
     pub(super) fn begin(&mut self, build_nodes: usize) {
         if self.open.capacity() == 0 {
             self.open.reserve(build_nodes);
         }
     }
 
-    /// Ends the last piece.
+    /// Closes the last piece.
     fn close(&mut self) {
         let piece = std::mem::take(&mut self.open);
         self.put(piece);
     }
 
-    /// Puts a piece behind the others.
+    /// Appends a piece.
     fn put(&mut self, piece: Vec<BuildNode>) {
         match self.pieces.last_mut() {
             Some(last) if last.len() + piece.len() <= PIECE => last.extend(piece),
@@ -130,7 +129,7 @@ impl TreeBuilder {
         }
     }
 
-    /// All build nodes, and how many are on the longest way down.
+    /// All build nodes, and their number on the longest path.
     pub(super) fn finish(mut self) -> (Vec<BuildNode>, usize) {
         self.close();
         (joined(self.pieces), self.depth)
@@ -157,7 +156,7 @@ pub(super) mod tests {
         [vec![root], first, second].concat()
     }
 
-    /// The first prim of each leaf; every box is the smallest around what is below it.
+    /// First prim of each leaf; checks that every box is the smallest around its content.
     pub(in super::super) fn leaves(build_nodes: &[BuildNode]) -> Vec<u32> {
         let root = &build_nodes[0];
         if root.is_leaf() {
@@ -169,7 +168,7 @@ pub(super) mod tests {
         [leaves(first), leaves(second)].concat()
     }
 
-    /// Build nodes on the longest way down.
+    /// Number of build nodes on the longest path.
     pub(in super::super) fn depth(build_nodes: &[BuildNode]) -> usize {
         let (mut left, mut most) = (vec![(0, 1)], 0);
         while let Some((i, depth)) = left.pop() {
@@ -182,8 +181,8 @@ pub(super) mod tests {
         most
     }
 
-    /// Adds a tree over so many leaves, of which the first has this number, cut anywhere, and shared where it has more than so
-    /// many.
+    /// Adds a tree over `leaves` leaves numbered from `first`, split at random, and shared between threads where it has more
+    /// than `shared` leaves.
     fn grow(builder: &mut TreeBuilder, first: u32, leaves: u32, shared: u32, seed: u64) {
         let bounds =
             |first: u32, leaves: u32| Aabb { lo: Vec3::splat(first as f32), hi: Vec3::splat((first + leaves) as f32) };
@@ -191,7 +190,7 @@ pub(super) mod tests {
             return builder.add(BuildNode::leaf(bounds(first, 1), first, 1));
         }
         let mut random = crate::math::random::Random::new(seed ^ u64::from(first) << 32 ^ u64::from(leaves));
-        // Every other cut takes off a leaf alone.
+        // Every other split takes off a single leaf.
         let cut = if random.below(2) == 0 { 1 } else { 1 + random.below(leaves as usize - 1) as u32 };
         let sides = [(first, cut), (first + cut, leaves - cut)];
         let [a, b] = sides.map(|(first, leaves)| move |g: &mut TreeBuilder| grow(g, first, leaves, shared, seed));

@@ -1,8 +1,7 @@
-//! One cell of the octree: its eight parts, and how they are joined in pairs.
+//! A cell of the octree: its eight parts, and their order as a binary tree.
 //!
-//! A cell is cut by all three of its middle planes at once, in one pass over what is in it. The parts are then the leaves
-//! of a little binary tree: of the three planes the one of least cost by surface area cuts first. What fits into a leaf is
-//! not cut.
+//! A cell is split by its three middle planes at once, in one pass over its items. The parts are then the leaves of a small
+//! binary tree: of the three planes the cheapest by surface area splits first. Parts that fit into a leaf are not split.
 
 use crate::accel::wide::split::area::weight;
 use crate::accel::wide::split::item::around_middles;
@@ -12,35 +11,35 @@ use crate::math::aabb::Aabb;
 use rayon::prelude::*;
 use std::ops::AddAssign;
 
-/// Items that one thread takes at a time where several share a cell. The same for every number of threads: so is the tree.
+/// Items per task where several threads share a cell. The same for every number of threads, and so is the tree.
 const CHUNK: usize = 1 << 12;
 
-/// Levels of the octree: so many that the number of a cell is exact in `f32`.
+/// Levels of the octree, limited so that the index of a cell is exact in `f32`.
 const LEVELS: u32 = 23;
 
-/// Where the finest cells of the octree are.
+/// Lattice of the finest octree cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lattice {
-    /// The least middle, doubled.
+    /// Smallest item middle, doubled.
     lo: Vec4,
     scale: Vec4,
 }
 
-/// The parts of a cell: part i lies beyond the plane of axis k where bit k of i is set.
+/// Parts of a cell: part i lies beyond the plane of axis k if bit k of i is set.
 pub(super) struct Cell {
     planes: Vec4,
     bounds: [Bounds; 8],
     counts: [Count; 8],
     leaf: u32,
-    /// Of each set of parts those that are cut off first; 0: it is not cut.
+    /// For each set of parts, the subset that is split off first; 0: the set is not split.
     first: [u8; 256],
-    /// Where the items of each part begin.
+    /// Index of the first item of each part.
     starts: [u32; 8],
-    /// What each [`CHUNK`] has in each part; empty where one thread does all.
+    /// Counts of each [`CHUNK`] per part; empty if one thread does all.
     chunks: Vec<[Count; 8]>,
 }
 
-/// How many items there are, and prims in them.
+/// Number of items, and of prims in them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Count {
     pub items: u32,
@@ -54,29 +53,29 @@ impl AddAssign for Count {
     }
 }
 
-/// The boxes around the parts of some items, and how many are in each.
+/// Boxes of the parts, and their counts.
 type Parts = ([Bounds; 8], [Count; 8]);
 
-/// Parts with a bit clear on each axis.
+/// Sets of the parts before the plane of each axis.
 const BEFORE: [u8; 3] = [0b0101_0101, 0b0011_0011, 0b0000_1111];
 
 impl Lattice {
     pub(super) fn over(bounds: &Aabb) -> Self {
         let lo = bounds.lo + bounds.lo;
         let side = (bounds.hi + bounds.hi - lo).max_element();
-        // A little less than all cells, so that the last middle is in the last one.
+        // Slightly fewer than all cells, so that the last middle falls into the last one.
         let cells = (1u32 << LEVELS) as f32 * (1.0 - f32::EPSILON);
         let scale = if side > 0.0 && side.is_finite() { cells / side } else { 0.0 };
         Self { lo: lo.extend(0.0), scale: Vec4::splat(scale) }
     }
 
-    /// The place of a doubled middle in finest cells.
+    /// Position of a doubled middle, in finest cells.
     #[inline(always)]
     fn place(&self, middle: Vec4) -> Vec4 {
         (middle - self.lo) * self.scale
     }
 
-    /// The smallest cell around items, and its parts; `None` where all are in one finest cell.
+    /// Smallest cell around the items, with its parts; `None` if all items are in one finest cell.
     pub(super) fn cell(&self, items: &[Item], leaf: u32) -> Option<Cell> {
         let shared = items.len() > 2 * CHUNK;
         let middles = if shared {
@@ -87,7 +86,7 @@ impl Lattice {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates, NaN is 0")]
         let number = |middle: Vec4| self.place(middle).to_array().map(|x| x as u32);
         let (lo, hi) = (number(middles.lo), number(middles.hi));
-        // The highest bit in which the outermost differ on any axis: set beyond a middle plane and clear before it.
+        // Highest bit in which the outermost cells differ on any axis: set beyond a middle plane and clear before it.
         let differ = [0, 1, 2].map(|k: usize| lo[k] ^ hi[k]);
         let bit = (differ[0] | differ[1] | differ[2]).checked_ilog2()?;
         #[expect(clippy::cast_precision_loss, reason = "at most 23 bits")]
@@ -129,27 +128,27 @@ fn part(place: Vec4, planes: Vec4) -> usize {
 }
 
 impl Cell {
-    /// The set of all parts.
+    /// Set of all parts.
     pub(super) const ALL: u8 = u8::MAX;
 
-    /// The parts of a set that are cut off first; `None` where it is not cut.
+    /// Subset of a set that is split off first; `None` if the set is not split.
     pub(super) fn cut(&self, set: u8) -> Option<u8> {
         Some(self.first[set as usize]).filter(|&first| first != 0)
     }
 
-    /// What is in a set of parts.
+    /// Number of items and prims in a set of parts.
     pub(super) fn count(&self, set: u8) -> Count {
         let mut count = Count::default();
         members(set).for_each(|i| count += self.counts[i]);
         count
     }
 
-    /// The box around a set of parts.
+    /// Box around a set of parts.
     pub(super) fn bounds(&self, set: u8) -> Bounds {
         members(set).fold(Bounds::EMPTY, |b, i| b.join(self.bounds[i]))
     }
 
-    /// Decides how a set of parts is cut, and where the items of each begin.
+    /// Chooses the splits of a set of parts, and the index of the first item of each part.
     fn order(&mut self, set: u8, start: &mut u32) {
         if let Some(first) = self.cheapest(set) {
             self.first[set as usize] = first;
@@ -185,7 +184,7 @@ impl Cell {
         best.1
     }
 
-    /// Puts items in order, part by part.
+    /// Sorts items by part.
     pub(super) fn sort(&self, lattice: &Lattice, items: &[Item], sorted: &mut [Item]) {
         let part = |item: &Item| part(lattice.place(item.middle()), self.planes);
         if self.chunks.is_empty() {
@@ -208,7 +207,7 @@ impl Cell {
         items.par_chunks(CHUNK).zip(self.places(sorted)).for_each(put);
     }
 
-    /// Where each chunk puts its items of each part.
+    /// Destination of each chunk's items, per part.
     fn places<'s>(&self, mut sorted: &'s mut [Item]) -> Vec<[&'s mut [Item]; 8]> {
         let mut places: Vec<[&mut [Item]; 8]> = self.chunks.iter().map(|_| Default::default()).collect();
         let mut parts = [0, 1, 2, 3, 4, 5, 6, 7];
@@ -246,7 +245,7 @@ mod tests {
 
     #[test]
     fn a_cell_is_cut_at_its_middle_and_not_elsewhere() {
-        // 3.9 and 4.1 lie on either side of the plane at 4, 4.1 and 5.9 on the same.
+        // 3.9 and 4.1 lie on different sides of the plane at 4, 4.1 and 5.9 on the same side.
         let items = items(&[5.9, 3.9, 4.1].map(|x| Vec3::new(x, 0.5, 0.5)));
         let lattice = Lattice::over(&SIDE);
         let cell = lattice.cell(&items, 1).unwrap();

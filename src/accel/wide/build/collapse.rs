@@ -1,10 +1,10 @@
-//! From a binary tree to nodes of eight.
+//! Collapse of a binary tree into 8-wide nodes.
 //!
-//! Which build nodes become nodes is chosen so that they cost the least: for every build node it is known what it costs to
-//! stand for everything below it by one child of a node, by two, and so on; a node takes what eight cost least. After H.
-//! Ylitie, T. Karras, S. Laine, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*, 2017. What a
-//! node costs is the chance that a ray enters it: of one that comes from afar the area of its box, of one that starts or
-//! ends at a shape the part of all shapes that are below it.
+//! The build nodes that become nodes are chosen for the least total cost: for every build node, a plan has the cost of
+//! representing its subtree by one child of a node, by two, and so on; a node takes the cheapest eight. After H. Ylitie, T.
+//! Karras, S. Laine, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*, 2017. The cost of a node is
+//! the probability that a ray enters it: for a ray from afar the area of its box, for a ray that starts or ends on a shape
+//! the share of all shapes below it.
 
 use std::ops::Range;
 
@@ -17,30 +17,32 @@ use crate::accel::wide::node::{Arrays, Child, Node, index};
 use crate::math::aabb::Aabb;
 use crate::math::simd::LANES;
 
-/// Build nodes that are worth a thread's while.
+/// Fewest build nodes for which work runs in parallel.
 const PARALLEL: usize = 512;
 
-/// A subtree of at most this part of all build nodes is a piece. The same for every number of threads: so is the order of nodes.
+/// A subtree of at most this fraction of all build nodes is a piece. The same for every number of threads, and so is the
+/// order of nodes.
 const PIECES: usize = 64;
 
-/// How many rays start or end at a shape where one comes from afar.
+/// Number of rays that start or end on a shape, per ray from afar.
 const NEAR: f32 = 0.15;
 
-/// The best ways of standing for a build node and all below it.
+/// Cheapest representations of a build node and its subtree.
 #[derive(Clone, Copy, Zeroable)]
 struct Plan {
-    /// By one child at most, two, … seven: what all nodes below cost, as areas.
+    /// Cost of all nodes below, as areas, when at most one, two, … seven children represent the subtree.
     costs: [f32; LANES - 1],
-    /// Build nodes below a build node, and itself; 0 of a leaf.
+    /// Number of build nodes in the subtree; 0 for a leaf.
     build_nodes: u32,
-    /// How many of two children, three, … eight, of a node of its own, stand for the first side; 0: one fewer will do.
+    /// Number of children for the first side out of two, three, … seven, and out of the eight of a node of its own; 0: one
+    /// child fewer costs no more.
     shares: [u8; LANES - 1],
 }
 
 impl Plan {
     const LEAF: Self = Self { costs: [0.0; LANES - 1], build_nodes: 0, shares: [0; LANES - 1] };
 
-    /// Of a build node over two sides; `near` is what a build node below a node adds to what that costs.
+    /// Plan of a build node over two sides; `near` is the cost that each build node below adds to a node.
     fn of(build_node: &BuildNode, near: f32, [first, second]: [&Self; 2]) -> Self {
         let cheapest = |children: usize| {
             let cost = |share: usize| first.costs[share - 1] + second.costs[children - share - 1];
@@ -64,11 +66,11 @@ impl Plan {
     }
 }
 
-/// Plans for a build node, the first, and all below it.
+/// Computes the plans of a build node, the first of the slice, and its subtree.
 fn plan(build_nodes: &[BuildNode], near: f32, plans: &mut [Plan]) {
     let Some(root) = build_nodes.first().filter(|_| build_nodes.len() > PARALLEL) else {
         for (at, build_node) in build_nodes.iter().enumerate().rev() {
-            // Leaves are written, too: a page that is read first takes two faults, the second of which stops all threads.
+            // Leaves are written, too: a page that is first read takes two faults, the second of which stops all threads.
             let is_leaf = build_node.is_leaf();
             plans[at] = if is_leaf {
                 Plan::LEAF
@@ -85,18 +87,18 @@ fn plan(build_nodes: &[BuildNode], near: f32, plans: &mut [Plan]) {
     plans[0] = Plan::of(root, near, [&plans[1], &plans[second]]);
 }
 
-/// The nodes of a tree, in pieces that threads made. The first is the root.
+/// Nodes of a tree, in pieces made by threads. The first node is the root.
 #[derive(Default)]
 pub(super) struct Nodes {
-    /// The nodes above all subtrees, which have their places in the whole as children, then subtrees, of which each has its
-    /// own nodes as children.
+    /// The nodes above all subtrees, whose children have their final indices, then the subtrees, whose children have indices
+    /// within their own piece.
     pieces: Vec<Vec<Node>>,
-    /// Nodes on the longest way down.
+    /// Number of nodes on the longest path.
     depth: u32,
 }
 
 impl Nodes {
-    /// The nodes over a binary tree whose leaves are packed children.
+    /// Collapses a binary tree whose leaves are packed children.
     pub(super) fn over(build_nodes: &[BuildNode]) -> Self {
         let mut plans = bytemuck::zeroed_vec(build_nodes.len());
         let near = build_nodes.first().map_or(0.0, BuildNode::area) * NEAR / build_nodes.len() as f32;
@@ -123,19 +125,19 @@ impl Nodes {
         Self { pieces, depth }
     }
 
-    /// The arrays of a tree of these nodes, with its bounds and room for so many blocks.
+    /// Arrays of a tree with these nodes and bounds, and room for `blocks` blocks.
     pub(super) fn into_arrays(self, blocks: usize, bounds: Aabb) -> Arrays {
         Arrays::new(&self.pieces, self.depth, blocks, bounds)
     }
 }
 
-/// A part of a tree that is built as a piece of its own.
+/// A subtree that is built as a piece of its own.
 struct Subtree {
     build_nodes: Range<usize>,
-    /// The node among those at the top, and its slot, which lead there.
+    /// Index of its parent among the top nodes, and its slot there.
     parent: usize,
     slot: usize,
-    /// Nodes above it.
+    /// Number of nodes above it.
     above: u32,
 }
 
@@ -144,7 +146,7 @@ struct Collapse<'k> {
     plans: &'k [Plan],
 }
 
-/// Build nodes that are children of one node: each with all below it.
+/// Build nodes that are the children of one node, each with its subtree.
 #[derive(Default)]
 struct Children {
     below: [Range<usize>; LANES],
@@ -158,8 +160,8 @@ impl Children {
 }
 
 impl Collapse<'_> {
-    /// Adds the node of a build node, the first of these, below so many nodes, and those below it that stand for more than
-    /// `largest` build nodes; lists the others.
+    /// Adds the node of a build node, the first of the range, at depth `above`, and the nodes below it that represent more
+    /// than `largest` build nodes; lists the remaining subtrees.
     fn top(
         &self,
         build_nodes: Range<usize>,
@@ -182,7 +184,8 @@ impl Collapse<'_> {
         }
     }
 
-    /// Adds the node of a build node, the first of these, and all below; how many nodes are on the longest way down.
+    /// Adds the node of a build node, the first of the range, and its subtree; returns the number of nodes on the longest
+    /// path.
     fn node(&self, build_nodes: Range<usize>, nodes: &mut Vec<Node>) -> u32 {
         let (children, slots, at) = self.open(build_nodes, nodes);
         let mut deepest = 0;
@@ -195,7 +198,8 @@ impl Collapse<'_> {
         1 + deepest
     }
 
-    /// Adds a node whose children are chosen, but for those that will be nodes; these and their slots, and its own place.
+    /// Adds a node with its chosen children, except those that become nodes; returns the children, their slots, and the
+    /// node's index.
     fn open(&self, build_nodes: Range<usize>, nodes: &mut Vec<Node>) -> (Children, [usize; LANES], usize) {
         let mut children = Children::default();
         self.expand(build_nodes, LANES, &mut children);
@@ -214,7 +218,7 @@ impl Collapse<'_> {
         (children, slots, nodes.len() - 1)
     }
 
-    /// The build nodes that stand for a build node, the first of these, and all below, as so many children.
+    /// Lists the build nodes that represent a build node, the first of the range, and its subtree by at most `most` children.
     fn expand(&self, build_nodes: Range<usize>, mut most: usize, found: &mut Children) {
         let (at, build_node) = (build_nodes.start, &self.build_nodes[build_nodes.start]);
         let shares = &self.plans[at].shares;
@@ -237,7 +241,7 @@ mod tests {
     use super::super::build_nodes::tests::{fork, leaf};
     use super::*;
 
-    /// The children of each node: how many there are, and how many of them are nodes.
+    /// Number of children of each node, and how many of them are nodes.
     fn shape(build_nodes: &[BuildNode]) -> Vec<(usize, usize)> {
         let mut packed = build_nodes.to_vec();
         packed.iter_mut().filter(|k| k.is_leaf()).for_each(|k| k.at = Child::Block(k.at, 1).pack());
@@ -260,7 +264,7 @@ mod tests {
 
     #[test]
     fn the_smallest_boxes_become_nodes_of_their_own() {
-        // Nine leaves: two must share a node, and those of the smallest box do.
+        // Nine leaves: two must share a node, and the pair with the smallest box does.
         let comb = (0..7).fold(fork(leaf(8, 0.0, 0.1), leaf(9, 0.1, 0.2)), |tree, i| fork(tree, small(i)));
         assert_eq!(shape(&comb), [(8, 1), (2, 0)]);
         let (mut tree, pair) = (comb, fork(leaf(10, 0.3, 0.31), leaf(11, 0.31, 0.32)));

@@ -1,57 +1,58 @@
-//! A binary tree, from the root down.
+//! Top-down construction of the binary tree.
 
 use super::build_nodes::{BuildNode, TreeBuilder, index};
 use super::cell::{Cell, Count, Lattice};
 use crate::accel::wide::split::{Bounds, Cut, Item, Splitting, cut_by_area};
 use std::ops::RangeInclusive;
 
-/// Fewer items are not worth a thread's while.
+/// Fewest items for which work runs in parallel.
 const PARALLEL: usize = 1024;
 
-/// Parts for each thread.
+/// Number of tasks per thread.
 const PARTS: usize = 16;
 
-/// Cells of few items are not cut at their planes but by area, which fills leaves better: of no more than this part of all
-/// items and no more than so many, but always of so few.
+/// Small cells are split by area instead of their planes, which fills leaves better: cells of at most 1/`SMALL_PART` of all
+/// items and at most the upper limit, but always those up to the lower limit.
 const SMALL_CELL: RangeInclusive<usize> = 1024..=8192;
 const SMALL_PART: usize = 4;
 
-/// So few prims are cut by area alone, whatever the splitting.
+/// Up to this many prims are split by area alone, whatever the splitting.
 pub(in crate::accel) const ALIKE: usize = *SMALL_CELL.start();
 
-/// A leaf whose box has more than this part of the root's area is met by many rays. It is cut all the same if its parts
-/// have less than that part of its own, or of its volume: rays that start beside a floor start in a box that is not as flat.
+/// A leaf whose box exceeds this fraction of the root's area is hit by many rays. It is split if its halves have less than
+/// `WORTH_CUTTING` of its area, or less than `FLAT` of its volume: rays that start near a floor start in a box that is less
+/// flat.
 const LARGE_LEAF: f32 = 1.0 / 2048.0;
 const WORTH_CUTTING: f32 = 0.8;
 const FLAT: f32 = 0.1;
 
-/// What a tree is grown over.
+/// Items of a subtree, and memory for its result.
 pub(super) struct Work<'w> {
     pub items: &'w mut [Item],
-    /// As much room again, where the splitting needs it.
+    /// Equally large scratch memory, if the splitting needs it.
     pub spare: &'w mut [Item],
-    /// The prims of leaves, in their order.
+    /// Prims of the leaves, in order.
     pub prims: &'w mut [u32],
-    /// How many prims stand before those.
+    /// Number of prims before these.
     pub first: u32,
 }
 
-/// How a tree is grown.
+/// Parameters of the construction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grower {
     lattice: Lattice,
-    /// Cells of no more items are cut by area.
+    /// Cells of up to this many items are split by area.
     small_cell: usize,
-    /// Prims of a leaf at most.
+    /// Largest number of prims in a leaf.
     leaf: u32,
     /// Area of the root's box.
     area: f32,
-    /// The sides of a build node over more items are grown in parallel.
+    /// The two sides of a build node over more items are built in parallel.
     parallel: usize,
 }
 
 impl<'w> Work<'w> {
-    /// Those items before `at`, with so many prims, and the others.
+    /// Splits into the items before `at`, with `prims` prims, and the rest.
     fn split_at(self, at: usize, prims: usize) -> [Self; 2] {
         let (a, b) = self.items.split_at_mut(at);
         let (spare_a, spare_b) = self.spare.split_at_mut(at.min(self.spare.len()));
@@ -69,8 +70,8 @@ impl<'w> Work<'w> {
 }
 
 impl Grower {
-    /// Of a tree over so many items within these bounds, whose leaves have up to `leaf` prims, a power of two. They stand for
-    /// `times` as many, and cells are cut as with those.
+    /// Prepares a tree over `items` items within these bounds, with leaves of up to `leaf` prims, a power of two. The items
+    /// represent `times` as many, and cells are split as for those.
     pub(super) fn new(splitting: Splitting, items: usize, times: usize, bounds: &Bounds, leaf: u32) -> Self {
         let small_cell = match splitting {
             Splitting::Octree => {
@@ -86,7 +87,7 @@ impl Grower {
     }
 
     /// Adds the tree over some items, at least one, to `builder`; the same for every number of threads. `middles` is the box
-    /// around their doubled middles, where known.
+    /// around their doubled middles, if known.
     pub(super) fn grow(&self, work: Work, bounds: Bounds, middles: Option<Bounds>, builder: &mut TreeBuilder) {
         let count = work.prims.len();
         if count <= self.leaf as usize {
@@ -109,7 +110,7 @@ impl Grower {
         self.fork(work, &cut, bounds, builder);
     }
 
-    /// The cut of what fits into a leaf, where it is better than the leaf.
+    /// Split of a set of prims that would fit into a leaf, if it is better than the leaf.
     fn cut_large_leaf(&self, items: &mut [Item], bounds: &Bounds) -> Option<Cut> {
         let area = bounds.area();
         if items.len() < 2 || area <= self.area * LARGE_LEAF {
@@ -121,7 +122,7 @@ impl Grower {
         Some(cut).filter(|_| worth)
     }
 
-    /// Adds the build node of a cut, and all below.
+    /// Adds the build node of a split, and its subtree.
     fn fork(&self, work: Work, cut: &Cut, bounds: Bounds, builder: &mut TreeBuilder) {
         let (count, [first, second]) = (work.items.len(), cut.bounds);
         let middles = |part: usize| cut.middles.map(|both| both[part]);
@@ -148,7 +149,7 @@ impl Grower {
         self.join(count, bounds, builder, grow_a, grow_b);
     }
 
-    /// Adds a build node over `count` items and its two sides, which are grown in parallel where it is worth it.
+    /// Adds a build node over `count` items and its two sides, in parallel where that pays.
     fn join(
         &self,
         count: usize,
@@ -160,8 +161,8 @@ impl Grower {
         if count > self.parallel {
             return builder.fork_shared(bounds.aabb(), first, second);
         }
-        // Mostly more than there will be, and memory that nothing is written to costs nothing: to enlarge what is full stops all
-        // threads. What is below has fewer items, and is not shared either.
+        // Mostly more than needed, but untouched memory costs nothing, while enlarging a full array stops all threads.
+        // Subtrees below have fewer items, and are not shared either.
         builder.begin(count);
         builder.fork(bounds.aabb(), first, second);
     }
@@ -208,7 +209,7 @@ mod tests {
         let places = [0.0, 0.5, 1.0, 90.0, 90.5].map(Vec3::splat);
         assert_eq!(leaves(&grown(Splitting::SurfaceArea, &places).0), [0, 3]);
         assert_eq!(leaves(&grown(Splitting::SurfaceArea, &[Vec3::ZERO; 5]).0), [0]);
-        // A floor and a pin that stands on it: hardly less area, but nearly all of the volume is cut off.
+        // A floor and a pin that stands on it: hardly less area, but the split removes nearly all of the volume.
         let boxes = [Vec3::new(9.0, 0.0, 9.0), Vec3::new(0.1, 4.0, 0.1)].map(|hi| Aabb { lo: Vec3::ZERO, hi });
         let items: Vec<Item> = (0..).zip(boxes).map(|(prim, bounds)| Item::new(bounds, prim)).collect();
         assert_eq!(leaves(&grown_over(Splitting::SurfaceArea, items).0), [0, 1]);

@@ -1,12 +1,12 @@
-//! From shapes to a tree.
+//! Building a tree over shapes.
 //!
-//! A binary tree ([`build_nodes`]) is grown from the root down ([`grow`]), improved where large and small faces are mixed
-//! ([`reinsert`]) and fused into nodes of eight ([`collapse`]). Its leaves become blocks. Large parts are worked on by several
-//! threads; what they make is joined in order, so that the tree does not depend on their number.
+//! A binary tree ([`build_nodes`]) is grown top-down ([`grow`]), improved where large and small faces are mixed
+//! ([`reinsert`]) and collapsed into 8-wide nodes ([`collapse`]). Its leaves become blocks. Large parts are built by several
+//! threads and joined in order, so that the tree does not depend on their number.
 //!
-//! Children stand in slots by where they are: the bit k of a slot's number is set where its child lies on the positive side
-//! of axis k, as far as the eight slots allow. `slot ^ octant` is then about the order in which a ray meets them, where
-//! bit k of `octant` is set for a ray that runs backwards along axis k. Slots between may be empty.
+//! Children are put into slots by position: bit k of a slot's number is set if its child lies on the positive side of axis k,
+//! as far as the eight slots allow. `slot ^ octant` is then roughly the order in which a ray enters them, where bit k of
+//! `octant` is set for a ray that runs backwards along axis k. Slots in between may be empty.
 
 mod build_nodes;
 mod cell;
@@ -30,21 +30,21 @@ use crate::math::simd::LANES;
 use crate::math::triangles::set_corners;
 use crate::parts::joined;
 
-/// Prims of a run at most: they cost more than a triangle, and are tested one by one.
+/// Largest number of prims in a run: they cost more than a triangle, and are tested one by one.
 const RUN: u32 = 2;
 
-/// Items or leaves that one thread takes at a time.
+/// Items or leaves per task.
 const CHUNK: usize = 1024;
 
-/// Build nodes that one thread takes at a time.
+/// Build nodes per task.
 const BUILD_NODES: usize = 1 << 14;
 
-/// How much more than twice as deep an improved tree may be: what is recursive must not run out of stack.
+/// Levels by which an improved tree may exceed twice its original depth: recursion must not overflow the stack.
 const ROOM: usize = 32;
 
-/// Builds the tree over all bounded prims, cut as if there were `times` as many.
+/// Builds the tree over all bounded prims, split as if there were `times` as many.
 ///
-/// Panics where there are more blocks than can be numbered: with hundreds of millions of triangles.
+/// Panics if there are more blocks than indices, which takes hundreds of millions of triangles.
 pub(super) fn build(shapes: &Shapes, splitting: Splitting, times: usize) -> Arrays {
     if shapes.bounded() == 0 {
         return Nodes::default().into_arrays(0, Aabb::EMPTY);
@@ -53,7 +53,7 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting, times: usize) -> Arra
     let Binary { build_nodes: grown, depth: grown_depth, prims } = binary_tree(shapes, splitting, times);
     let (mut build_nodes, improved_depth) = reinsert::improve(grown);
     if improved_depth.is_some_and(|depth| depth > deepest(grown_depth)) {
-        // Where boxes hardly have an area rounding makes places better, and build nodes may be hung one below the other.
+        // Where boxes hardly have an area, rounding makes positions look better, and build nodes may form a long chain.
         build_nodes = binary_tree(shapes, splitting, times).build_nodes;
     }
     let leaves = Leaves::list(&mut build_nodes, index(triangles));
@@ -62,13 +62,13 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting, times: usize) -> Arra
     let bounds = build_nodes.first().map_or(Aabb::EMPTY, BuildNode::bounds);
     let nodes = Nodes::over(&build_nodes);
     drop(build_nodes);
-    // Empty slots lead to block 0, and a ray that no box can turn away goes there too.
+    // Empty slots lead to block 0, and so does a ray that no box can reject.
     let mut arrays = nodes.into_arrays(leaves.blocks.len().max(1), bounds);
     leaves.fill(arrays.blocks_mut(), shapes, &prims);
     arrays.with_runs(leaves.runs, prims[triangles..].to_vec())
 }
 
-/// How deep a tree may become that was so deep before it was improved.
+/// Largest depth of an improved tree that had depth `depth` before.
 fn deepest(depth: usize) -> usize {
     2 * depth + ROOM
 }
@@ -76,9 +76,9 @@ fn deepest(depth: usize) -> usize {
 /// A binary tree over all bounded prims.
 struct Binary {
     build_nodes: Vec<BuildNode>,
-    /// Build nodes on the longest way down.
+    /// Number of build nodes on the longest path.
     depth: usize,
-    /// The prims of leaves, in their order, triangles before others. A leaf holds triangles or other prims, never both.
+    /// Prims of the leaves, in order, triangles before others. A leaf holds triangles or other prims, never both.
     prims: Vec<u32>,
 }
 
@@ -88,7 +88,7 @@ fn binary_tree(shapes: &Shapes, splitting: Splitting, times: usize) -> Binary {
     let (triangle_prims, other_prims) = prims.split_at_mut(shapes.triangles.len());
     let grow = |items: Items, prims: &mut [u32], first: u32, leaf: u32, builder: &mut TreeBuilder| {
         let Items { mut all, bounds, middles } = items;
-        // Pages that nothing was written to are made by the threads that write there.
+        // Untouched pages are mapped by the threads that first write there.
         let spare = if splitting == Splitting::Octree { all.len() } else { 0 };
         let mut spare = bytemuck::zeroed_vec(spare);
         let grower = Grower::new(splitting, all.len(), times, &bounds, leaf);
@@ -109,11 +109,11 @@ fn binary_tree(shapes: &Shapes, splitting: Splitting, times: usize) -> Binary {
     Binary { build_nodes, depth, prims }
 }
 
-/// What a tree is grown over.
+/// Items over which a tree is grown.
 struct Items {
     all: Vec<Item>,
     bounds: Bounds,
-    /// The box around the middles, doubled.
+    /// Box around the doubled middles.
     middles: Bounds,
 }
 
@@ -142,7 +142,7 @@ impl Items {
         Self { all, bounds, middles }
     }
 
-    /// All other bounded prims.
+    /// Items of all other bounded prims.
     fn of_others(shapes: &Shapes) -> Self {
         let others = (index(shapes.triangles.len())..shapes.bounded()).into_par_iter().with_min_len(CHUNK);
         let all: Vec<Item> = others.map(|prim| Item::of(shapes, prim)).collect();
@@ -153,24 +153,24 @@ impl Items {
     }
 }
 
-/// Where the prims of a leaf are, and how many.
+/// Index of a leaf's first prim, and their number.
 type Listed = (u32, u32);
 
 fn part(prims: &[u32], (first, count): Listed) -> &[u32] {
     &prims[first as usize..(first + count) as usize]
 }
 
-/// All leaves, in their order.
+/// All leaves, in order.
 #[derive(Default)]
 struct Leaves {
     blocks: Vec<Listed>,
-    /// Counted from the first prim that is no triangle.
+    /// Runs; indices count from the first prim that is not a triangle.
     runs: Vec<Listed>,
 }
 
 impl Leaves {
-    /// Lists the leaves among `build_nodes`, over prims of which the first `triangles` are triangles. Each then has the
-    /// child that it is, packed, in place of its first prim.
+    /// Lists the leaves among `build_nodes`, over prims of which the first `triangles` are triangles, and replaces the first
+    /// prim of each leaf by its packed child.
     fn list(build_nodes: &mut [BuildNode], triangles: u32) -> Self {
         let count = |chunk: &[BuildNode]| {
             let leaves = chunk.iter().filter(|build_node| build_node.is_leaf());
@@ -191,7 +191,7 @@ impl Leaves {
         Self { blocks: joined(blocks), runs: joined(runs) }
     }
 
-    /// Of some build nodes, before which so many blocks and runs stand.
+    /// Lists the leaves of some build nodes after the given numbers of blocks and runs.
     fn list_from([blocks, runs]: [u32; 2], build_nodes: &mut [BuildNode], triangles: u32) -> Self {
         let mut all = Self::default();
         for build_node in build_nodes.iter_mut().filter(|build_node| build_node.is_leaf()) {
@@ -208,7 +208,7 @@ impl Leaves {
         all
     }
 
-    /// Makes the blocks; where there are none, one without triangles.
+    /// Fills in the blocks; without any leaves, a single empty one.
     fn fill(&self, blocks: &mut [Block], shapes: &Shapes, prims: &[u32]) {
         if self.blocks.is_empty() {
             return blocks.fill(Block::EMPTY);
@@ -239,7 +239,7 @@ mod tests {
     fn every_triangle_is_in_one_item_however_many_pairs_there_are() {
         let mut random = crate::math::random::Random::new(5);
         for (count, near) in [(1, 0), (CHUNK, 0), (3 * CHUNK + 1, 1), (5 * CHUNK + 7, 2), (4 * CHUNK, 3)] {
-            // Of three triangles so many are near the one before.
+            // `near` of three triangles are near the previous one.
             let (mut corner, mut vertices) = (Vec3::ZERO, Vec::new());
             for i in 0..count {
                 corner = if i % 3 < near { corner } else { random.cube() * 100.0 };
@@ -286,8 +286,8 @@ mod tests {
         }
     }
 
-    /// Where areas are too small to be told from zero, every cut goes through the middle, and takes off one triangle of those
-    /// whose distances halve: three times the levels and more of an even tree.
+    /// Where areas are too small to differ from zero, every split goes through the middle, and takes off one triangle of
+    /// those whose distances halve: more than three times the levels of a balanced tree.
     #[test]
     fn a_tree_that_is_far_too_deep_and_that_threads_share_fits_on_their_stacks() {
         let place = |i: i32| -1e-19 * 0.5f32.powi(i.min(80));
@@ -305,7 +305,7 @@ mod tests {
         }
     }
 
-    /// A mesh so far away that rounding leaves a few points of it.
+    /// A mesh so far away that rounding collapses it to a few points.
     #[test]
     fn triangles_that_collapsed_to_points_make_no_deep_tree() {
         let side = 120;

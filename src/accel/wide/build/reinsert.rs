@@ -1,10 +1,10 @@
-//! Moves subtrees to where they enlarge fewer boxes.
+//! Reinsertion: moves subtrees to places where they enlarge fewer boxes.
 //!
-//! After J. Bittner, M. Hapala, V. Havran, *Fast Insertion-Based Optimization of Bounding Volume Hierarchies*, 2013: a build node
-//! is taken out with its parent, and put back beside the build node that adds the least area above it, found by branch and bound.
-//! Those that promise most are tried first, some at a time, for as long as enough of them move: a mesh that is one even
-//! surface costs hardly more than looking, and large faces before small ones, which cuts between middles handle badly, are
-//! put where they do the least harm. One after the other, so that the result does not depend on threads.
+//! After J. Bittner, M. Hapala, V. Havran, *Fast Insertion-Based Optimization of Bounding Volume Hierarchies*, 2013: a build
+//! node is removed with its parent, and reinserted beside the build node where it adds the least area to the tree, found by
+//! branch and bound. The most promising are tried first, in batches, for as long as enough of them move: an evenly
+//! tessellated mesh costs hardly more than the search, and large faces before small ones, which splits between middles handle
+//! badly, are put where they do the least harm. The moves are sequential, so that the result does not depend on threads.
 
 use super::build_nodes::{BuildNode, index};
 use crate::accel::wide::split::Bounds;
@@ -12,48 +12,48 @@ use crate::math::aabb::Aabb;
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
-/// Build nodes that are tried before it is asked whether that paid.
+/// Build nodes tried before their success is judged.
 const BATCH: usize = 256;
 
-/// Build nodes that one thread takes at a time.
+/// Build nodes per task.
 const CHUNK: usize = 1 << 14;
 
-/// It paid if one in so many moved.
+/// A batch succeeds if one build node in this many moved.
 const WORTH: usize = 12;
 
-/// Of so many build nodes one is tried at most, and no more than so many; and a batch, or the fourth part of a small tree and a
-/// few.
+/// Limits of the number of build nodes tried: one in `SHARE`, at most `MOST`; plus a batch, or in a small tree a quarter of
+/// all and `FEW`.
 const SHARE: usize = 32;
 const MOST: usize = 4096;
 const FEW: usize = 16;
 
-/// The part of its own area that counts against what taking a build node out can save. All of it comes back wherever the
-/// build node goes; but boxes further up may shrink, too.
+/// Fraction of its own area that is subtracted from the possible gain of removing a build node. All of it returns wherever
+/// the build node is inserted; but boxes further up may shrink, too.
 const RETURNS: f32 = 0.75;
 
-/// A binary tree with links.
+/// Binary tree with parent links.
 struct Links {
     build_nodes: Vec<BuildNode>,
     links: Vec<Link>,
-    /// Places still to be looked at: what is added above them, and the build node.
+    /// Search queue: the area added above a candidate, and the candidate build node.
     open: Vec<(f32, u32)>,
-    /// Build nodes on the way up from one.
+    /// Build nodes on the path from a build node to the root.
     way: Vec<u32>,
 }
 
-/// What of a build node changes.
+/// Mutable part of a build node.
 #[derive(Clone, Copy, Zeroable)]
 struct Link {
     bounds: Bounds,
     parent: u32,
-    /// Both [`ROOT`] of a leaf.
+    /// The two children; both are [`ROOT`] for a leaf.
     sides: [u32; 2],
 }
 
-/// The root, which is never moved.
+/// Index of the root, which is never moved.
 const ROOT: u32 = 0;
 
-/// Improves a tree; how many build nodes are on the longest way down, if anything was moved.
+/// Improves a tree; also returns the number of build nodes on the longest path if anything was moved.
 pub(super) fn improve(build_nodes: Vec<BuildNode>) -> (Vec<BuildNode>, Option<usize>) {
     let order = promising(&build_nodes);
     let mut links = Links::new(build_nodes);
@@ -72,12 +72,12 @@ pub(super) fn improve(build_nodes: Vec<BuildNode>) -> (Vec<BuildNode>, Option<us
     (build_nodes, Some(depth))
 }
 
-/// The build nodes that may be tried, by falling promise.
+/// Candidates for reinsertion, most promising first.
 ///
-/// Cuts leave small build nodes alone with large ones, in boxes much larger than they are, and what is saved by taking a
-/// build node out is that box.
+/// Splits leave small build nodes alone with large ones, in boxes much larger than they are, and removing a build node saves
+/// that box.
 fn promising(build_nodes: &[BuildNode]) -> Vec<(f32, u32)> {
-    // All but the root.
+    // All except the root.
     let count = build_nodes.len().saturating_sub(1);
     let most = (count / SHARE).min(MOST) + BATCH.min(count / 4 + FEW);
     let better = |a: &(f32, u32), b: &(f32, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
@@ -106,7 +106,7 @@ fn promising(build_nodes: &[BuildNode]) -> Vec<(f32, u32)> {
     all
 }
 
-/// Links a build node, the first of these, which is number `first` and stands below `parent`, and all below it.
+/// Links a build node, the first of the slice, with index `first` and parent `parent`, and its subtree.
 fn link(build_nodes: &[BuildNode], first: u32, parent: u32, links: &mut [Link]) {
     links[0].parent = parent;
     if build_nodes.len() <= CHUNK {
@@ -152,7 +152,7 @@ impl Links {
         self.links[build_node as usize].sides
     }
 
-    /// Whether a build node was moved elsewhere.
+    /// Reinserts a build node and returns whether it moved.
     fn reinsert(&mut self, build_node: u32) -> bool {
         let parent = self.parent(build_node);
         if parent == ROOT {
@@ -166,13 +166,13 @@ impl Links {
         self.replace(beside, parent);
         self.links[parent as usize].sides = [beside, build_node];
         self.links[beside as usize].parent = parent;
-        // A box that happens to be the old one is above others now.
+        // A box that happens to equal the old one may contain other build nodes now.
         self.fit(parent);
         self.fit(self.parent(parent));
         beside != sibling
     }
 
-    /// Puts `by` where `build_node` is.
+    /// Replaces `build_node` by `by` in its parent.
     fn replace(&mut self, build_node: u32, by: u32) {
         let above = self.parent(build_node);
         let sides = &mut self.links[above as usize].sides;
@@ -180,7 +180,7 @@ impl Links {
         self.links[by as usize].parent = above;
     }
 
-    /// Makes the boxes fit from a build node up to where they do already.
+    /// Refits the boxes from a build node up to the first that already fits.
     fn fit(&mut self, mut build_node: u32) {
         loop {
             let [a, b] = self.sides(build_node).map(|side| self.bounds(side));
@@ -194,7 +194,7 @@ impl Links {
         }
     }
 
-    /// The build node beside which a box adds the least area to the tree: `known`, or one where it is less.
+    /// Build node beside which a box adds the least area to the tree: `known`, or a cheaper one.
     fn best_place(&mut self, bounds: Bounds, known: u32) -> u32 {
         let alone = bounds.area();
         let (mut least, mut best) = (self.added_beside(bounds, known), known);
@@ -218,7 +218,7 @@ impl Links {
         best
     }
 
-    /// The area that a box beside a build node adds to the tree, with that of the build node above both.
+    /// Area that a box beside a build node adds to the tree, including that of their new parent.
     fn added_beside(&mut self, bounds: Bounds, build_node: u32) -> f32 {
         self.way.clear();
         let mut above = build_node;
@@ -226,7 +226,7 @@ impl Links {
             above = self.parent(above);
             self.way.push(above);
         }
-        // From the root down, as the search adds.
+        // From the root down, in the order of the search.
         let grown = |added: f32, &above: &u32| {
             let here = self.bounds(above);
             (added + here.join(bounds).area() - here.area()).max(0.0)
@@ -234,11 +234,11 @@ impl Links {
         self.way.iter().rev().fold(0.0, grown) + self.bounds(build_node).join(bounds).area()
     }
 
-    /// The build nodes in order again, each followed by its first side; how many are on the longest way down.
+    /// Build nodes in array order again, each followed by its first side; also returns the number on the longest path.
     fn in_order(&self) -> (Vec<BuildNode>, usize) {
         let mut build_nodes = Vec::with_capacity(self.build_nodes.len());
         let mut deepest = 0;
-        // What is still to come, how deep it is, and the build node whose second side it is.
+        // Remaining build nodes with their depth, and the array index of the parent if they are its second side.
         let mut stack = vec![(ROOT, 1, None)];
         while let Some((build_node, depth, above)) = stack.pop() {
             deepest = deepest.max(depth);
@@ -252,7 +252,7 @@ impl Links {
             (copy.lo, copy.hi) = (lo, hi);
             if !copy.is_leaf() {
                 let [first, second] = self.sides(build_node);
-                // Until the second side is there, where the build node itself is.
+                // Its own index, until its second side is placed.
                 copy.at = index(at);
                 stack.extend([(second, depth + 1, Some(at)), (first, depth + 1, None)]);
             }
@@ -267,14 +267,14 @@ mod tests {
     use super::super::build_nodes::tests::{fork, leaf, leaves};
     use super::*;
 
-    /// The areas of all boxes but those of leaves.
+    /// Total area of all boxes except those of leaves.
     fn cost(build_nodes: &[BuildNode]) -> f32 {
         build_nodes.iter().filter(|k| !k.is_leaf()).map(BuildNode::area).sum()
     }
 
     #[test]
     fn a_large_box_among_small_ones_is_put_where_it_enlarges_no_other() {
-        // 0 to 5 in a row, and 6 around all of them beside 0.
+        // Leaves 0 to 5 in a row, and leaf 6 around all of them beside 0.
         let small = |i: u32| leaf(i, i as f32, i as f32 + 0.5);
         let large = leaf(6, 0.0, 5.5);
         let left = fork(fork(fork(small(0), large), small(1)), small(2));
@@ -282,7 +282,7 @@ mod tests {
         let (improved, depth) = improve(build_nodes.clone());
         assert_eq!(depth, Some(super::super::build_nodes::tests::depth(&improved)));
         assert!(cost(&improved) < 0.7 * cost(&build_nodes), "{} {}", cost(&improved), cost(&build_nodes));
-        // Checks the boxes and the links as well.
+        // `leaves` checks the boxes and the links as well.
         let (mut before, mut after) = (leaves(&build_nodes), leaves(&improved));
         before.sort_unstable();
         after.sort_unstable();
@@ -297,7 +297,7 @@ mod tests {
         assert_eq!(tried.filter(BuildNode::is_leaf).map(|leaf| leaf.at).next(), Some(0));
     }
 
-    /// As many leaves as asked for, cut in the middle.
+    /// Tree over `leaves` leaves, split in the middle.
     fn even(first: u32, leaves: u32) -> Vec<BuildNode> {
         if leaves == 1 {
             let size = (first % 7) as f32 * 0.1 + 0.1;

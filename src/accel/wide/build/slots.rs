@@ -1,11 +1,11 @@
-//! Which child of a node stands in which slot.
+//! Assignment of the children of a node to slots.
 
 use crate::math::Vec3;
 use crate::math::aabb::Aabb;
 use crate::math::simd::LANES;
 
-/// The slot of each of up to eight children: of all pairs the one that suits best is taken first. A child suits a slot the
-/// better the farther it lies from the middle in the slot's direction.
+/// Slot of each of up to eight children: greedily takes the best pair of child and slot first. A child suits a slot the
+/// better, the farther it lies from the centre in the slot's direction.
 pub(super) fn slots(children: &[Aabb]) -> [usize; LANES] {
     let all = children.iter().fold(Aabb::EMPTY, |b, c| b.union(*c));
     // Halves, so that no sum overflows.
@@ -19,7 +19,7 @@ pub(super) fn slots(children: &[Aabb]) -> [usize; LANES] {
     let table: [[f32; LANES]; LANES] = std::array::from_fn(suits);
     let best_of = |child: usize, free: u32| {
         let slots = (0..LANES).filter(|slot| free >> slot & 1 == 1);
-        // The first of equals.
+        // The first of equal ones.
         slots.map(|slot| (table[child][slot], slot)).reduce(|a, b| if b.0 > a.0 { b } else { a })
     };
 
@@ -71,7 +71,7 @@ mod tests {
             slots.dedup();
             assert_eq!(slots.len(), copies);
         }
-        // Middles that are no numbers do no harm.
+        // NaN middles do no harm.
         let far = Aabb { lo: Vec3::splat(-f32::MAX), hi: Vec3::splat(f32::MAX) };
         let [a, b, c, ..] = slots(&[far; 3]);
         assert!(a != b && b != c && a != c);
