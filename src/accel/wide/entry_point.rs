@@ -1,8 +1,8 @@
-//! Entry points: where the rays of a pencil enter the tree, many at a time.
+//! Entry points: nodes at which whole groups of a pencil's rays enter the tree.
 //!
-//! Packets that follow each other meet the same boxes near the root. So these are asked once about all rays of a group of
-//! packets, and what is left is laid out as one node more, from which each packet goes on (after A. Reshetov, A. Soupikov and
-//! J. Hurley, *Multi-Level Ray Tracing Algorithm*, 2005).
+//! Consecutive packets meet the same boxes near the root. These boxes are tested once against all rays of a group of packets,
+//! and the remaining children form one extra node, at which each packet starts (after A. Reshetov, A. Soupikov and J. Hurley,
+//! *Multi-Level Ray Tracing Algorithm*, 2005).
 
 use super::flight::FARTHEST_FIRST;
 use super::interval_ray::IntervalRay;
@@ -14,30 +14,30 @@ use crate::math::Vec3;
 use crate::math::bounds::{BOX_RANGE, PARALLEL};
 use crate::math::simd::{LANES, Lanewise, Simd, WIDE};
 
-/// Rays that enter together: of eight broad packets.
+/// Number of rays in a group: eight broad packets.
 pub(super) const GROUP: usize = 256;
 
-/// The entry point of one group of rays.
+/// Entry point of one group of rays.
 pub(super) struct EntryPoint {
-    /// What any of the rays may meet, the nearest where their octant looks first.
+    /// Children that any of the rays may meet, the nearest in the slot that their octant visits first.
     pub node: Node,
-    /// The rays: up to the one before this.
+    /// End of the group: index of the ray after its last one.
     end: usize,
     pub state: State,
 }
 
-/// What is known of a group.
+/// State of a group's entry point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum State {
-    /// Its rays enter by the root.
+    /// No entry point: the rays start at the root.
     Unknown,
-    /// They enter here.
+    /// The rays start at the entry point.
     Open,
-    /// None of them meets a box.
+    /// No ray of the group meets a box.
     Closed,
 }
 
-/// A child by the node and the slot that hold it.
+/// A child, by its node and slot.
 #[derive(Clone, Copy, Default)]
 struct Spot {
     node: u32,
@@ -47,7 +47,7 @@ struct Spot {
 /// Bounds of the directions of a group.
 struct Directions {
     octant: usize,
-    /// Least and greatest reciprocals.
+    /// Smallest and largest reciprocals.
     inverse: [Vec3; 2],
 }
 
@@ -56,19 +56,19 @@ impl EntryPoint {
         Self { node: Node::EMPTY, end: 0, state: State::Unknown }
     }
 
-    /// Whether the next ray is the first of a group.
+    /// Whether the ray `start` begins a new group.
     #[inline(always)]
     pub(super) fn is_passed(&self, start: usize) -> bool {
         start >= self.end
     }
 
-    /// Where so many rays enter.
+    /// Packed child at which `count` rays from `start` on enter.
     #[inline(always)]
     pub(super) fn of(&self, start: usize, count: usize) -> u32 {
         if self.state == State::Unknown || start + count > self.end { 0 } else { Child::ENTRY_POINT }
     }
 
-    /// Finds the entry point of the group that begins here, if there are as many rays.
+    /// Finds the entry point of the group that begins at `start`, if there are enough rays.
     #[inline(always)]
     pub(super) fn find<B: BoxMargins, S: Simd>(&mut self, s: S, tree: &Tree, pencil: &Pencil, start: usize) {
         (self.end, self.state) = (start + GROUP, State::Unknown);
@@ -81,7 +81,7 @@ impl EntryPoint {
         self.state = self.open(s, tree, &interval, octant);
     }
 
-    /// Opens node after node as long as there is room for what is found in them.
+    /// Opens nodes as long as there is room for their children.
     #[inline(always)]
     fn open<S: Simd>(&mut self, s: S, tree: &Tree, interval: &IntervalRay, octant: usize) -> State {
         let mut spots = [Spot::default(); LANES];
@@ -123,13 +123,13 @@ impl EntryPoint {
     }
 }
 
-/// Which children of a node any ray of an interval ray may meet.
+/// Bit mask of the children of a node that any ray of an interval ray may meet.
 #[inline(always)]
 fn met<S: Simd>(s: S, tree: &Tree, interval: &IntervalRay, octant: usize, node: u32) -> usize {
     interval.meets(s, &tree.nodes[node as usize].planes, octant, f32::INFINITY).1 as usize % 256
 }
 
-/// Puts the children of a node in a mask behind others, the nearest first; how many there are then.
+/// Appends the children in the mask `met` to `spots`, the nearest first, and returns the new count.
 #[inline(always)]
 fn put(spots: &mut [Spot; LANES], mut count: usize, node: u32, octant: usize, met: usize) -> usize {
     let order = FARTHEST_FIRST[octant % LANES][met];
@@ -142,7 +142,8 @@ fn put(spots: &mut [Spot; LANES], mut count: usize, node: u32, octant: usize, me
 }
 
 impl Directions {
-    /// Of a group of a pencil, if it is one: rays to one octant, with numbers for which the bounds of padded boxes hold.
+    /// Bounds of a group of a pencil; `None` unless its rays share an octant and the bounds of padded boxes hold for their
+    /// numbers.
     #[inline(always)]
     fn of<T: Lanewise<WIDE>>(s: T, pencil: &Pencil, start: usize) -> Option<Self> {
         let [x, y, z] = pencil.dirs.map(|row| row.get(start..start + GROUP));
@@ -156,7 +157,7 @@ impl Directions {
             }
             sum = s.add(sum, s.add(s.add(d[0], d[1]), d[2]));
         }
-        // A NaN stays in a sum.
+        // A sum keeps a NaN.
         if s.at_most(s.abs(sum), s.splat(f32::MAX)) & all::<WIDE>() != all::<WIDE>() {
             return None;
         }
@@ -172,7 +173,7 @@ impl Directions {
         if !fit || !range.contains(&least.element_sum()) || !range.contains(&greatest.element_sum()) {
             return None;
         }
-        // What nearly runs along other axes is taken to have this much of each, as in `Padding`.
+        // Components nearly perpendicular to the main axis are raised to this fraction of the largest, as in `Padding`.
         let slow = least.max(Vec3::splat(least.max_element() * PARALLEL));
         let fast = greatest.max(Vec3::splat(greatest.max_element() * PARALLEL));
         let (from, to) = (1.0 / fast, 1.0 / slow);

@@ -1,9 +1,9 @@
-//! Many rays in flight: while one waits for memory or for a comparison, others go on.
+//! Many rays in flight: while one waits for memory or a comparison, others proceed.
 //!
-//! Every ray has a slot with a stack of its own. A step of a ray that is at a node has no branch that depends on what it
-//! meets: children are put on the stack in the order of their slots as the ray's octant sees them, and the top is taken
-//! off. Rays that are at leaves wait until there are enough of them. What one ray is asked does not depend on the others,
-//! and answers are ordered by (t, prim): they are those of the rays one after another.
+//! Every ray has a slot with its own stack. A step of a ray at a node has no data-dependent branch: all children are pushed
+//! in the order of their slots as seen from the ray's octant, and the top is popped. Rays at leaves wait until there are
+//! enough of them. No ray's queries depend on the others, and hits are ordered by (t, prim): the answers are those of the
+//! rays one after another.
 
 use std::marker::PhantomData;
 
@@ -18,16 +18,16 @@ use crate::accel::{Hit, NO_PRIM, Shapes};
 use crate::math::simd::{Kernel, LANES, Order, Simd};
 use bytemuck::Zeroable;
 
-/// Rays in flight: one for each bit of a word.
+/// Number of rays in flight: one per bit of a word.
 const SLOTS: usize = 32;
 
-/// Rays at leaves that are worth a turn.
+/// Fewest rays at leaves that are worth a pass over the leaves.
 const LEAVES: u32 = 16;
 
-/// Entries of a stack that trees may need here; what may need more goes another way.
+/// Largest stack that a tree may need to be traced in flight; deeper trees are traced in another way.
 pub(super) const DEPTH: usize = 128;
 
-/// By octant and mask of lanes: the lanes in the mask, the farthest first as that octant sees them.
+/// By octant and lane mask: the lanes in the mask, the farthest first as seen from that octant.
 pub(super) static FARTHEST_FIRST: [[Order; 256]; LANES] = farthest_first();
 
 const fn farthest_first() -> [[Order; 256]; LANES] {
@@ -58,33 +58,33 @@ const fn farthest_first() -> [[Order; 256]; LANES] {
 struct Slot {
     ray: PreparedRay,
     seeker: Seeker,
-    /// Above the top of its stack.
+    /// Index above the top of the stack.
     top: usize,
-    /// Its stack, distances and children apart, so that eight are written at once; the first is never taken off, and above
-    /// the last there is room for what is written and not used.
+    /// The stack, distances and children apart, so that eight entries are written at once; the first entry is never popped,
+    /// and above the last there is room for surplus lanes of a write.
     near: [f32; DEPTH + LANES],
     children: [u32; DEPTH + LANES],
 }
 
-/// A batch of rays, and the slots that they fly in.
+/// A batch of rays, and the slots in which they are traced.
 pub(super) struct InFlight<'w, W, B> {
     pub flight: Flight<'w, W, B>,
     pub slots: &'w mut Slots,
 }
 
-/// A batch of rays.
+/// A batch of rays with the tree they are traced through.
 pub(super) struct Flight<'w, W, B> {
     pub tree: &'w Tree<'w>,
-    /// Whether it is worth fetching what is visited next.
+    /// Whether prefetching the next nodes pays.
     pub far: bool,
     pub shapes: &'w Shapes,
     pub batch: &'w mut W,
-    /// For rays that go by themselves.
+    /// Stack for rays that are traced alone.
     pub entries: &'w mut [Entry],
     pub margins: PhantomData<B>,
 }
 
-/// Slots by the bits of their numbers.
+/// States of the slots, as bit masks.
 struct SlotMasks {
     nodes: u32,
     leaves: u32,
@@ -95,9 +95,9 @@ struct SlotMasks {
 #[derive(Clone, Debug)]
 pub(super) struct Slots {
     slots: Box<[Slot; SLOTS]>,
-    /// Where each of them is; [`Child::END`] without a ray, too.
+    /// Packed child at which each ray is; [`Child::END`] also for empty slots.
     at: [u32; SLOTS],
-    /// Those that have a ray, by the bits of their numbers.
+    /// Bit mask of the slots that hold a ray.
     taken: u32,
 }
 
@@ -115,7 +115,7 @@ impl Default for Slots {
 }
 
 impl Slots {
-    /// Which of them are where.
+    /// Bit masks of the slots at nodes, at leaves, and at their end.
     #[inline(always)]
     fn whereabouts<S: Simd>(&self, s: S) -> SlotMasks {
         let (mut leaves, mut ended) = (0, 0);
@@ -126,7 +126,7 @@ impl Slots {
         SlotMasks { nodes: !leaves & self.taken, leaves: leaves & !ended, ended: ended & self.taken }
     }
 
-    /// Where a slot is.
+    /// A slot, and the packed child at which its ray is.
     #[inline(always)]
     fn at(&mut self, number: u32) -> (&mut Slot, &mut u32) {
         let number = number as usize % SLOTS;
@@ -134,11 +134,11 @@ impl Slots {
     }
 }
 
-/// Rays that wait.
+/// Queue of the rays that are not in flight yet.
 struct Queue {
-    /// The eight that the next one is of.
+    /// The eight prepared rays that contain the next one.
     ready: PreparedRays,
-    /// The next one's number in the batch.
+    /// Index of the next ray in the batch.
     next: usize,
 }
 
@@ -169,7 +169,7 @@ impl<W: QueryBatch, B: BoxMargins> Kernel for InFlight<'_, W, B> {
 }
 
 impl Slot {
-    /// As [`Self::pop`] does, eight entries at a time.
+    /// [`Self::pop`], eight entries at a time.
     #[inline(always)]
     fn pop_many<S: Simd>(&mut self, s: S) -> u32 {
         let mut top = self.top;
@@ -188,7 +188,7 @@ impl Slot {
         self.children[top % DEPTH]
     }
 
-    /// Takes the next child off the stack that may hold a hit.
+    /// Pops the next child that may hold a hit.
     #[inline(always)]
     fn pop(&mut self) -> u32 {
         let mut top = self.top;
@@ -202,13 +202,13 @@ impl Slot {
         self.children[top % DEPTH]
     }
 
-    /// Puts the children that are met on the stack of a ray that runs to this octant, the nearest last.
+    /// Pushes the children in `met`, the nearest last, for a ray with the given octant.
     #[inline(always)]
     fn push<S: Simd>(&mut self, s: S, octant: u32, node: &Node, near: S::Lanes, met: u32) {
         let order = FARTHEST_FIRST[octant as usize % LANES][met as usize % 256];
         let top = self.top % DEPTH;
         let (nears, children) = (self.near[top..].first_chunk_mut(), self.children[top..].first_chunk_mut());
-        // There is room for eight above every top.
+        // There is room for eight entries above every top.
         if let (Some(nears), Some(children)) = (nears, children) {
             s.arrange(near, order, nears);
             s.arrange_words(&node.children, order, children);
@@ -218,8 +218,7 @@ impl Slot {
 }
 
 impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
-    /// Puts the next ray that meets a box of the root into a slot, if there is one; those before it that do not are
-    /// answered.
+    /// Puts the next ray that meets a box of the root into a slot, if there is one; answers the rays before it, which miss.
     #[inline(always)]
     fn start<S: Simd>(&mut self, s: S, slots: &mut Slots, number: u32, queue: &mut Queue) {
         while queue.next < self.batch.rays().len() {
@@ -240,7 +239,7 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
                 let seeker = Seeker::new(ray, queue.ready.t_min[lane], i, queue.ready.exclude[lane]);
                 (slot.ray, slot.seeker) = (*ray, seeker);
                 slot.top = LANES;
-                // From where it was made ready: the slot's own is still on its way.
+                // From the prepared ray: the copy in the slot is still being written.
                 slot.push(s, ray.slabs.octant, root, near, met);
                 *at = slot.pop();
                 slots.taken |= 1 << number;
@@ -251,7 +250,7 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
         slots.taken &= !(1 << number);
     }
 
-    /// Every ray that is at a node goes on to the next child.
+    /// Moves every ray at a node on to its next child.
     #[inline(always)]
     fn step<S: Simd>(&self, s: S, slots: &mut Slots, nodes: u32) {
         if self.far {
@@ -261,7 +260,7 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
         }
     }
 
-    /// Steps each ray; with `FAR` the nodes that come next are prefetched.
+    /// Steps each ray; with `FAR` the next nodes are prefetched.
     #[inline(always)]
     fn step_each<S: Simd, const FAR: bool>(&self, s: S, slots: &mut Slots, mut nodes: u32) {
         let tree_nodes = self.tree.nodes;
@@ -279,8 +278,8 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
         }
     }
 
-    /// Every ray that is at a leaf tests it and goes on; those that have their answer by that are returned. First all are
-    /// tested, then what was hit is looked at: which that is cannot be predicted, and so no test waits for another's outcome.
+    /// Tests every ray at a leaf and moves it on; returns a mask of the rays answered by that. All are tested before any hit
+    /// is processed: which rays hit is unpredictable, and this way no test waits for the outcome of another.
     #[inline(always)]
     fn test<S: Simd>(&self, s: S, slots: &mut Slots, mut leaves: u32, met: &mut [BlockHits; SLOTS]) -> u32 {
         let (mut turn, mut open, mut answered) = (leaves, 0, 0);
@@ -310,7 +309,7 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
         answered
     }
 
-    /// Answers the rays that have ended, and puts new ones in their places.
+    /// Answers the rays that have ended, and refills their slots.
     #[inline(always)]
     fn renew<S: Simd>(
         &mut self,

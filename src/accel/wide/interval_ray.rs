@@ -1,4 +1,4 @@
-//! Many rays as one: bounds of where any of them meets a plane.
+//! Interval rays: bounds of the distances at which any of many rays meets a plane.
 
 use super::node::Tree;
 use super::padded::FIRST;
@@ -7,20 +7,20 @@ use crate::math::Vec3;
 use crate::math::bounds::PARALLEL;
 use crate::math::simd::{LANES, Pick, Row, Simd};
 
-/// Linear bounds of the distances at which any of the rays meets a plane across an axis: from below for planes by which rays
-/// enter, from above for those by which they leave; valid where these are not below zero (S. Boulos, I. Wald, P. Shirley,
-/// *Geometric and Arithmetic Culling Methods for Entire Ray Packets*, 2006).
+/// Linear bounds of the distances at which any of the rays meets a plane perpendicular to an axis: lower bounds for entry
+/// planes, upper bounds for exit planes; valid where these are not negative (S. Boulos, I. Wald, P. Shirley, *Geometric and
+/// Arithmetic Culling Methods for Entire Ray Packets*, 2006).
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct IntervalRay {
-    /// By axis: what a plane is multiplied with, and what is added.
+    /// By axis: factor of the plane, and summand.
     first: [[f32; 2]; 3],
     last: [[f32; 2]; 3],
     from: f32,
 }
 
 impl IntervalRay {
-    /// Of rays to one octant whose origins and reciprocals of directions ([`Padding`](super::padded::Padding)) lie between
-    /// these, with hits from `from` on.
+    /// Bounds of rays with one octant whose origins and reciprocal directions ([`Padding`](super::padded::Padding)) lie
+    /// between the given ones, with hits from `from` on.
     #[inline(always)]
     pub(super) fn new<B: BoxMargins>(
         tree: &Tree,
@@ -34,7 +34,7 @@ impl IntervalRay {
         let drift = PARALLEL * (tree.extent + farthest.element_sum());
         for k in 0..3 {
             let pad = B::PAD * (tree.extent + farthest[k]) + drift;
-            // The fastest ray from the foremost origin meets planes first, the slowest from the hindmost last.
+            // The fastest ray from the foremost origin meets planes first, the slowest from the rearmost last.
             let (fast, slow, front, rear) = if octant >> k & 1 == 1 {
                 (greatest[k], least[k], low[k], high[k])
             } else {
@@ -46,14 +46,14 @@ impl IntervalRay {
         interval
     }
 
-    /// The least size of a reciprocal along an axis.
+    /// Smallest absolute reciprocal along an axis.
     #[inline(always)]
     pub(super) fn fastest(&self, axis: usize) -> f32 {
         self.first[axis % 3][0].abs()
     }
 
-    /// Which of eight boxes any ray may meet up to `limit`, and the least distances of that; by axis, the planes that come
-    /// first and those that come last.
+    /// Least entry distances of eight boxes, and the mask of those that any ray may meet up to `limit`; `first` and `last`
+    /// are the entry and exit planes by axis.
     #[inline(always)]
     pub(super) fn between<S: Simd>(
         &self,
@@ -71,7 +71,7 @@ impl IntervalRay {
         (near, s.in_order(near, far))
     }
 
-    /// Which of eight boxes any ray may meet, of rays to an octant; planes in the order of a node's.
+    /// [`Self::between`] for rays with one octant; planes in the order of a node's.
     #[inline(always)]
     pub(super) fn meets<S: Simd>(&self, s: S, planes: &[Row; 6], octant: usize, limit: f32) -> (S::Lanes, u32) {
         let [x, y, z] = FIRST[octant % LANES];

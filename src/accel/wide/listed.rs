@@ -1,6 +1,6 @@
-//! Brute force in blocks: every triangle is tested, eight at a time, and no box is asked.
+//! Brute force in blocks: every triangle is tested, eight at a time, without any box.
 //!
-//! What [`none`](crate::accel::none) answers, some times sooner: for judging other structures over many rays.
+//! Answers like [`none`](crate::accel::none), but several times faster: the reference for other structures over many rays.
 
 use super::node::Block;
 use crate::accel::query::{Culling, Goal, Query};
@@ -9,7 +9,7 @@ use crate::math::aabb::Aabb;
 use crate::math::simd::{Kernel, LANES, Level, Simd};
 use crate::math::triangles::{RayLanes, reach, set_corners};
 
-/// All triangles as blocks.
+/// All triangles, as blocks.
 #[derive(Clone, Debug)]
 pub struct Listed<'a> {
     shapes: &'a Shapes,
@@ -19,7 +19,7 @@ pub struct Listed<'a> {
 }
 
 impl<'a> Listed<'a> {
-    /// Blocks in the order of the prims.
+    /// Creates blocks in the order of the prims.
     pub fn new(shapes: &'a Shapes) -> Self {
         let count = u32::try_from(shapes.triangles.len()).unwrap_or(u32::MAX);
         let block = |first: u32| {

@@ -1,5 +1,5 @@
-//! Each margin of the walk is needed: with the derived ones every answer is that of brute force, and without any one of
-//! them some are not.
+//! Tests that each margin of the walk is needed: with the derived margins every answer equals brute force, and without any
+//! one of them some answers do not.
 
 use std::marker::PhantomData;
 
@@ -14,10 +14,10 @@ use crate::accel::{Probe, Ray, RayCounts, Shapes};
 use crate::math::Vec3;
 use crate::math::random::Random;
 
-/// A tree walked by other margins.
+/// A tree walked with other margins.
 struct Walked<'a, B> {
     wide: Wide<'a>,
-    /// Each ray by the walk that counts.
+    /// Whether each ray takes the counting walk.
     counted: bool,
     margins: PhantomData<fn() -> B>,
 }
@@ -70,7 +70,7 @@ impl BoxMargins for AnyCoordinates {
     const COORDINATES: f32 = f32::INFINITY;
 }
 
-/// Wrong answers of both trees, in every order of the rays and by the walk that counts.
+/// Number of wrong answers of both trees, in every trace mode, and by the counting walk.
 fn wrong_with<B: BoxMargins>(shapes: &Shapes, rays: &[Ray]) -> usize {
     let ways = [TraceMode::OneByOne, TraceMode::InFlight, TraceMode::Packets];
     let of = |splitting| {
@@ -83,7 +83,7 @@ fn wrong_with<B: BoxMargins>(shapes: &Shapes, rays: &[Ray]) -> usize {
     of(Splitting::Octree) + of(Splitting::SurfaceArea)
 }
 
-/// Nothing is wrong with the derived margins, something is with the others.
+/// Asserts that nothing is wrong with the derived margins and something is with the others.
 fn assert_needed<B: BoxMargins>(shapes: &Shapes, rays: &[Ray]) {
     assert_eq!(wrong_with::<Derived>(shapes, rays), 0, "as derived");
     assert!(wrong_with::<B>(shapes, rays) > 0, "nothing goes wrong without it");
@@ -104,7 +104,7 @@ fn boxes_behind_the_best_hit_may_hold_another_as_near() {
     assert_needed::<NoRange>(&shapes, &rays);
 }
 
-/// Rays through corners of boxes, so fast that distances have few bits left.
+/// Rays through corners of boxes, so fast that their distances have few bits left.
 #[test]
 fn among_the_smallest_numbers_distances_to_boxes_underflow() {
     let mut r = Random::new(15);
@@ -113,7 +113,7 @@ fn among_the_smallest_numbers_distances_to_boxes_underflow() {
     let aim = |_| {
         let origin = (r.cube() * 8.0).round() * scale;
         let target = shapes.vertices[r.below(shapes.vertices.len())];
-        // Exactly along the way to the corner: its distance is 1 / (m 2¹²⁰).
+        // Exactly towards the corner: its distance is 1 / (m 2¹²⁰).
         let m = 2.0 * (r.unit() * 2048.0).floor() + 1.0;
         ray(origin, (target - origin) * m * 2.0f32.powi(120))
     };
@@ -121,7 +121,7 @@ fn among_the_smallest_numbers_distances_to_boxes_underflow() {
     assert_needed::<NoUnderflow>(&shapes, &rays);
 }
 
-/// Differences of coordinates near the largest float are infinite, and so are the distances made of them.
+/// Differences of coordinates near the largest float are infinite, and so are distances computed from them.
 #[test]
 fn boxes_near_the_largest_float_are_not_asked() {
     let at = |x: f32, y: f32| [Vec3::new(x, y - 1e37, -1e37), Vec3::new(x, y + 1e37, -1e37), Vec3::new(x, y, 1e37)];

@@ -1,6 +1,6 @@
-//! The fast structures: a tree of nodes with eight children, whose leaves are blocks of eight triangles.
+//! The fast structures: a tree of 8-wide nodes, whose leaves are blocks of eight triangles.
 //!
-//! Two ways of cutting the scene share one memory layout (`node`), one proof (`check`) and three ways of tracing a batch:
+//! Two ways of splitting the scene share one memory layout (`node`), one proof (`check`) and three ways of tracing a batch:
 //!
 //! - `fast-octree` ([`Splitting::Octree`]): the uniform grid refined by octrees, kept as boxes. The scene's cube is cut at
 //!   dyadic planes, those of grid and octree cells, and small cells by surface area; every part keeps the tight box of its
@@ -10,13 +10,13 @@
 //! In both, the binary cuts are improved and fused into nodes of eight (`build`). Each prim is listed once, so there is no
 //! mailbox: there would be nothing for it to save.
 //!
-//! Rays go one by one (`single`), many in flight (`flight`) or in packets of sixteen and more (`packet`; those from one
-//! place have common entry points, `entry_point`, and share what they see of blocks, `block_cache`), through triangles;
-//! where there is anything else, and in counted runs, they go one by one through whatever there is (`walk`). Hits are
-//! ordered by (t, prim) and every test gives an exact verdict, so that neither the order of visits nor the company of other
-//! rays can change an answer. Counts are those of one ray at a time.
+//! Rays are traced one by one (`single`), many in flight (`flight`) or in packets of sixteen and more (`packet`; packets of a
+//! pencil share entry points, `entry_point`, and prepared blocks, `block_cache`) through trees of triangles alone; with other
+//! prims, and in counted runs, they go one by one through any tree (`walk`). Hits are ordered by (t, prim) and every test
+//! gives an exact verdict, so that neither the order of visits nor the other rays can change an answer. Counts are those of
+//! one ray at a time.
 //!
-//! An object that stands in several places has a tree in its own frame, through which rays go one by one (`placed`).
+//! An instanced object has a tree in its own frame, through which rays go one by one (`placed`).
 
 mod best;
 mod build;
@@ -61,33 +61,33 @@ use super::query_batch::QueryBatch;
 use super::{NoProbe, Probe, Shapes};
 use crate::math::simd::{Kernel, Level, WIDE, portably};
 
-/// How the rays of a batch are traced. The answers are the same.
+/// How the rays of a batch are traced. All modes give the same answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TraceMode {
-    /// Side by side where most rays run alike; else in flight, or one after another where there are few.
+    /// In packets where most rays run alike; else in flight, or one by one if there are few.
     Adaptive,
-    /// One after another.
+    /// One ray after another.
     OneByOne,
-    /// Many at a time, each its own way.
+    /// Many rays at a time, each on its own path.
     InFlight,
-    /// Sixteen or thirty-two side by side where they run alike, the others one after another.
+    /// Packets of sixteen or thirty-two rays that run alike, the others one by one.
     Packets,
 }
 
-/// Of a tree of so many bytes most comes soon enough from the caches: rays in flight are 5 to 12 % faster when they do not
-/// fetch what they visit next, with trees of half a megabyte to four; 7 % slower with one of fourteen (measured).
+/// Largest tree, in bytes, that is served mostly from the caches: without prefetching the next nodes, rays in flight are 5 to
+/// 12 % faster with trees of half a megabyte to four, and 7 % slower with one of fourteen (measured).
 const NEAR: usize = 1 << 23;
 
-/// Packets of a batch that are asked how they run, at most: asking all 256 of a batch of 4096 rays took some percent of the
-/// time of rays that hit soon (measured).
+/// Largest number of packets of a batch that are examined for coherence: examining all 256 of a batch of 4096 rays took some
+/// percent of the time of rays that hit soon (measured).
 const ASKED: usize = 32;
 
-/// Rays from which on it pays to have them in flight.
+/// Fewest rays that are worth tracing in flight.
 const MANY: usize = 2 * WIDE;
 
 impl TraceMode {
-    /// What suits a batch: by how many of the packets that it would make run to one octant, as far as three rays of each of
-    /// some tell.
+    /// Mode for a batch, chosen by the share of packets whose rays have one octant, judged by three rays of each packet of a
+    /// sample.
     fn of<W: QueryBatch>(batch: &W) -> Self {
         let octant = |i: usize| {
             let dir = batch.ray(i).dir;
@@ -106,7 +106,7 @@ impl TraceMode {
     }
 }
 
-/// A tree of eight-wide nodes over shapes.
+/// A tree of 8-wide nodes over shapes.
 #[derive(Clone, Debug)]
 pub struct Wide<'a> {
     shapes: &'a Shapes,
@@ -117,12 +117,12 @@ pub struct Wide<'a> {
 }
 
 impl<'a> Wide<'a> {
-    /// Builds it over the bounded prims; the same for every number of threads.
+    /// Builds the tree over the bounded prims; the same for every number of threads.
     pub fn build(shapes: &'a Shapes, splitting: Splitting) -> Self {
         Self::build_sample(shapes, splitting, 1)
     }
 
-    /// Builds it over a sample of a scene, cut as one of `times` as many prims would be.
+    /// Builds the tree over a sample of a scene, split as if there were `times` as many prims.
     pub(super) fn build_sample(shapes: &'a Shapes, splitting: Splitting, times: usize) -> Self {
         Self {
             shapes,
@@ -133,31 +133,31 @@ impl<'a> Wide<'a> {
         }
     }
 
-    /// Walks with another instruction set than the best one; the answers are the same.
+    /// Selects another instruction set than the best one; the answers are the same.
     #[must_use]
     pub fn at_level(self, level: Level) -> Self {
         Self { level, ..self }
     }
 
-    /// Traces batches in another way; the answers are the same.
+    /// Selects another trace mode; the answers are the same.
     #[must_use]
     pub fn with_rays(self, rays: TraceMode) -> Self {
         Self { rays, ..self }
     }
 
-    /// Walks by given margins.
+    /// Walks with given margins.
     #[inline]
     fn walk_within<B: BoxMargins, G: Goal, P: Probe>(&self, query: &mut Query<G>, stack: &mut Stack, probe: &mut P) {
         self.run_narrow::<B, _>(Walk { tree: &self.tree(), query, stack, probe, margins: PhantomData::<B> });
     }
 
-    /// Runs a kernel that walks by margins `B`. What is not asked for is not compiled.
+    /// Runs a kernel that walks with margins `B`. Unused levels are not compiled.
     #[inline]
     fn run<B: BoxMargins, K: Kernel>(&self, kernel: K) -> K::Output {
         if B::EVERY_LEVEL { self.level.run(kernel) } else { self.level.run_vectors(kernel) }
     }
 
-    /// Runs a kernel that has no use for more than eight lanes.
+    /// Runs a kernel that uses at most eight lanes.
     #[inline]
     fn run_narrow<B: BoxMargins, K: Kernel>(&self, kernel: K) -> K::Output {
         if B::EVERY_LEVEL { self.level.run_narrow(kernel) } else { self.level.run_vectors(kernel) }
@@ -168,7 +168,7 @@ impl<'a> Wide<'a> {
         self.arrays.tree()
     }
 
-    /// How the scene was cut.
+    /// How the scene was split.
     pub fn splitting(&self) -> Splitting {
         self.splitting
     }
@@ -194,20 +194,20 @@ impl Culling for Wide<'_> {
     }
 }
 
-/// Whether packets and rays in flight are allowed, as any way that gives the same answers: nothing is counted, and the test is
-/// exact.
+/// Whether packets and rays in flight are allowed, like any way that gives the same answers: nothing is counted, and the test
+/// is exact.
 struct Together<W, P>(PhantomData<(W, P)>);
 
 impl<W: QueryBatch, P: Probe> Together<W, P> {
     const MAY: bool = P::SILENT && W::Goal::EXACT;
-    /// Whether it is worth code for every instruction set.
+    /// Whether compiling it for every instruction set pays.
     const ON_EVERY_LEVEL: bool = P::SILENT || P::OF_PICTURES && W::Goal::EXACT;
 }
 
 impl Wide<'_> {
-    /// Traces a batch by given margins.
+    /// Traces a batch with given margins.
     fn trace_within<B: BoxMargins, W: QueryBatch, P: Probe>(&self, batch: &mut W, stack: &mut Stack, probe: &mut P) {
-        // Where it is false nothing is compiled for it.
+        // Where it is false, this branch is not compiled.
         if Together::<W, P>::MAY {
             return self.trace_together::<B, _>(batch, stack);
         }
@@ -229,7 +229,7 @@ impl Wide<'_> {
             }
             TraceMode::InFlight if tree.most_behind() < DEPTH => {
                 let flight = Flight { tree, far: tree.bytes() > NEAR, shapes, batch, entries, margins };
-                // Eight lanes are all it has a use for: with AVX-512's masks it was 4 to 8 % slower on the one processor where
+                // Eight lanes are all that it uses: with AVX-512's masks it was 4 to 8 % slower on the one processor where
                 // both were measured.
                 self.run_narrow::<B, _>(InFlight { flight, slots });
             }

@@ -10,20 +10,20 @@ use crate::parts::cut;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-/// Eight children: their boxes and what they are.
+/// An inner node: the boxes of its eight children, and what they are.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Node {
-    /// Planes of the children: lower and upper x, lower and upper y, lower and upper z.
+    /// Planes of the children's boxes: lower and upper x, lower and upper y, lower and upper z.
     pub planes: [Row; 6],
     /// Packed [`Child`]ren.
     pub children: [u32; LANES],
-    /// Nothing, so that each begins where a cache line does.
+    /// Padding, so that every node begins on a cache line.
     room: [u32; LANES],
 }
 
 impl Node {
-    /// No child.
+    /// Node without children.
     pub(super) const EMPTY: Self = Self {
         planes: {
             let (lower, upper) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
@@ -41,36 +41,36 @@ impl Node {
         self.children[slot] = child.pack();
     }
 
-    /// The box of a child; empty where there is none.
+    /// Box of a child; empty if there is none.
     pub(super) fn bounds(&self, slot: usize) -> Aabb {
         let corner = |side: usize| [0, 1, 2].map(|k: usize| self.planes[2 * k + side][slot]).into();
         Aabb { lo: corner(0), hi: corner(1) }
     }
 }
 
-/// What a slot of a node leads to.
+/// Content of a slot of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Child {
-    /// Index into [`Tree::nodes`].
+    /// An inner node: index into [`Tree::nodes`].
     Node(u32),
-    /// Index into [`Tree::blocks`], and how many of its lanes hold a triangle.
+    /// A block: index into [`Tree::blocks`], and the number of its lanes that hold a triangle.
     Block(u32, u32),
-    /// Index into [`Tree::runs`].
+    /// A run of other prims: index into [`Tree::runs`].
     Run(u32),
 }
 
 impl Child {
-    /// A block without triangles: where an empty slot leads.
+    /// Packed content of an empty slot: a block without triangles.
     pub(super) const NOTHING: u32 = Self::LEAF;
-    /// No child, packed: the end of a stack. The last run there could be, which no tree has.
+    /// Packed end of a stack: the last possible run, which no tree has.
     pub(super) const END: u32 = u32::MAX;
-    /// The entry point of packets, packed: the last node there could be, which no tree has.
+    /// Packed entry point of packets: the last possible node, which no tree has.
     pub(super) const ENTRY_POINT: u32 = Self::LEAF - 1;
     const LEAF: u32 = 1 << 31;
     const COUNT: u32 = 27;
-    /// The most blocks, and the most runs, of a tree: [`Self::END`] would be one more.
+    /// Largest number of blocks, and of runs, of a tree: one more would collide with [`Self::END`].
     pub(super) const MOST: usize = (1 << Self::COUNT) - 1;
-    /// A count that no block has marks a run.
+    /// Marks a run: a count that no block has.
     const RUN: u32 = 15;
 
     pub(super) fn pack(self) -> u32 {
@@ -87,15 +87,15 @@ impl Child {
         word & Self::LEAF != 0
     }
 
-    /// The index of the node or of the block that a packed child leads to, and 0 for the other; without branches.
+    /// Index of the node and index of the block of a packed child, 0 for the one that it is not; without branches.
     #[inline(always)]
     pub(super) fn either(word: u32) -> (usize, usize) {
         let leaf = (word >> 31).wrapping_neg();
         ((word & !leaf) as usize, (word & leaf & ((1 << Self::COUNT) - 1)) as usize)
     }
 
-    /// The index of the block that a packed child leads to, if it leads to one, and how many of its lanes hold a triangle;
-    /// of [`Self::END`] an index that no block has.
+    /// Index of the block of a packed child, if it is a block, and the number of its lanes that hold a triangle; for
+    /// [`Self::END`] an index that no block has.
     #[inline(always)]
     pub(super) fn block(word: u32) -> (u32, u32) {
         (word & ((1 << Self::COUNT) - 1), word >> Self::COUNT & 15)
@@ -111,7 +111,7 @@ impl Child {
         }
     }
 
-    /// A packed child after so many nodes were put before those of its tree.
+    /// Packed child with its index moved by the `nodes` nodes put before those of its tree.
     fn behind(word: u32, nodes: u32) -> u32 {
         match Self::unpack(word) {
             Self::Node(i) => Self::Node(i + nodes).pack(),
@@ -125,7 +125,7 @@ impl Child {
 #[repr(C, align(64))]
 pub(super) struct Block {
     pub corners: Corners8,
-    /// The triangle in each lane; [`NO_PRIM`] behind the last.
+    /// The triangle in each lane; [`NO_PRIM`] in the unused last lanes.
     pub prims: [u32; LANES],
 }
 
@@ -133,38 +133,38 @@ impl Block {
     pub(super) const EMPTY: Self = Self { corners: NO_CORNERS, prims: [NO_PRIM; LANES] };
 }
 
-/// A cache line.
+/// One cache line.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 struct Line([u32; 16]);
 
-/// Cache lines of a node.
+/// Number of cache lines of a node.
 const OF_NODE: usize = size_of::<Node>() / size_of::<Line>();
 
-/// Cache lines of a block.
+/// Number of cache lines of a block.
 const OF_BLOCK: usize = size_of::<Block>() / size_of::<Line>();
 
-/// Everything in arrays.
+/// Memory of a tree.
 #[derive(Clone, Debug)]
 pub(super) struct Arrays {
-    /// The lines of all nodes, then those of all blocks: in one piece, so that they share large pages.
+    /// Cache lines of all nodes, then of all blocks: in one allocation, so that they share huge pages.
     lines: Paged<Line>,
     nodes: usize,
-    /// Other prims than triangles: (first, number) in [`Self::prims`].
+    /// Runs of prims other than triangles: (first, count) in [`Self::prims`].
     runs: Vec<(u32, u32)>,
     prims: Vec<u32>,
-    /// Around everything.
+    /// Box around all prims.
     bounds: Aabb,
-    /// Largest coordinate of a box, in size.
+    /// Largest absolute coordinate of a box.
     extent: f32,
-    /// Nodes on the longest way down.
+    /// Number of nodes on the longest path.
     depth: u32,
 }
 
-/// [`Arrays`] as they are walked.
+/// View of [`Arrays`] for traversal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tree<'a> {
-    /// The first is the root; there is none when there are no bounded prims.
+    /// Inner nodes, root first; empty without bounded prims.
     pub nodes: &'a [Node],
     pub blocks: &'a [Block],
     pub runs: &'a [(u32, u32)],
@@ -175,9 +175,8 @@ pub(super) struct Tree<'a> {
 }
 
 impl Arrays {
-    /// The nodes of these pieces, one behind the other, of which the first is the root, in these bounds, and room for so many
-    /// blocks. Children are numbered within their piece, and those of the first piece in the whole; `depth` nodes are on the
-    /// longest way down.
+    /// Joins the nodes of these pieces, of which the first node is the root, and reserves room for `blocks` blocks. Children
+    /// have indices within their piece, but final ones in the first piece; `depth` nodes are on the longest path.
     pub(super) fn new(pieces: &[Vec<Node>], depth: u32, blocks: usize, bounds: Aabb) -> Self {
         let nodes = pieces.iter().map(Vec::len).sum();
         let mut lines = Paged::zeroed(OF_NODE * nodes + OF_BLOCK * blocks);
@@ -193,7 +192,7 @@ impl Arrays {
         Self { lines, nodes, runs: Vec::new(), prims: Vec::new(), bounds, extent, depth }
     }
 
-    /// With runs of these prims.
+    /// Adds runs over these prims.
     pub(super) fn with_runs(self, runs: Vec<(u32, u32)>, prims: Vec<u32>) -> Self {
         Self { runs, prims, ..self }
     }
@@ -211,17 +210,17 @@ impl Arrays {
 }
 
 impl<'a> Tree<'a> {
-    /// How long a stack may become: every node on the way leaves up to seven children behind.
+    /// Largest size of a stack: every node on the path leaves up to seven children behind.
     pub(super) fn most_behind(&self) -> usize {
         (LANES - 1) * self.depth as usize + LANES
     }
 
-    /// Bytes of the arrays.
+    /// Size of the arrays, in bytes.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(self.nodes) + size_of_val(self.blocks) + size_of_val(self.runs) + size_of_val(self.prims)
     }
 
-    /// What is said of a child that is visited.
+    /// Record of a visit to a child.
     pub(super) fn visit(&self, child: u32, shapes: &Shapes) -> Visit {
         let around = |prims: &[u32]| {
             let bounds = prims.iter().fold(Aabb::EMPTY, |b, &p| b.union(shapes.bounds(p)));
@@ -238,7 +237,7 @@ impl<'a> Tree<'a> {
         Visit { place, extent: Extent::Box(bounds), listed }
     }
 
-    /// The prims of a run.
+    /// Prims of a run.
     #[inline]
     pub(super) fn run(&self, run: u32) -> &'a [u32] {
         let (first, len) = self.runs[run as usize];

@@ -1,17 +1,18 @@
-//! Sixteen or thirty-two rays side by side: rays that run alike visit the same nodes, which are read and ordered once for all.
+//! Packets of sixteen or thirty-two rays: rays that run alike visit the same nodes, which are loaded and ordered once for
+//! all.
 //!
-//! A node's boxes are first asked about all rays at once, by an interval ray (`interval_ray`) of origins and reciprocals of
-//! directions (after S. Boulos et al., *Packet-based Whitted and Distribution Ray Tracing*, 2007); of several boxes that
-//! are left each is asked about each ray. At a leaf the triangles' own boxes are asked about the interval, and what is left
-//! is tested against all rays at once. Best hits are known by intervals, as in `best`; exact distances are found at the
-//! end, those of all rays together. What rays from one place see of a block is found once for all packets that visit it one
-//! soon after the other (`block_cache`).
+//! A node's boxes are first tested against all rays at once, by an interval ray (`interval_ray`) of origins and reciprocal
+//! directions (after S. Boulos et al., *Packet-based Whitted and Distribution Ray Tracing*, 2007); if several boxes remain,
+//! each is tested against each ray. At a leaf the boxes of single triangles are tested against the interval, and each
+//! remaining triangle against all rays at once. Best hits are known by intervals, as in `best`; exact distances are computed
+//! at the end, for all rays together. Data that rays from one origin share for a block are kept for the next packets
+//! (`block_cache`).
 //!
-//! What a packet waits for is mostly itself: each test decides which is next. So thirty-two rays, where there are registers
-//! for them, take little more time than sixteen, as long as they stay together; where less than half of them visit what the
-//! packet visits, those that follow go by sixteen.
+//! A packet waits mostly for itself: each test decides which is next. So where there are enough registers, thirty-two rays
+//! take little more time than sixteen as long as they stay together; where less than half of them visit what the packet
+//! visits, the next packets are narrow.
 //!
-//! A few rays that do not run as the others do go their own ways, one after another, and so do all where too few run alike.
+//! A few rays that diverge from their packet are traced one by one, and so are all rays where too few run alike.
 
 use std::marker::PhantomData;
 
@@ -37,41 +38,41 @@ use crate::math::simd::{BROAD, Kernel, LANES, Lanewise, Simd, WIDE};
 use crate::math::triangle;
 use crate::math::triangles::Verdicts;
 
-/// So many rays before they are taken they are fetched: a processor that foretells what is read does not see beyond a page.
+/// Prefetch distance, in rays: the hardware prefetcher does not cross page boundaries.
 const AHEAD: usize = 128;
 
-/// Rays of sixteen that run alike from which on they are a packet, without the others.
+/// Fewest rays of sixteen that run alike and make a packet, without the others.
 const ENOUGH: u32 = 8;
 
-/// Likewise of packets of thirty-two: what runs otherwise may be a packet of its own.
+/// The same for packets of thirty-two: rays that diverge may make a packet of their own.
 const ENOUGH_BROAD: u32 = 24;
 
-/// So many narrow packets come after a broad one whose rays are not close, and twice as many after the next such one.
+/// Number of narrow packets after a broad one with low occupancy; doubled with each further one.
 const PATIENCE: usize = 8;
 
 /// A child still to be visited.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct StackEntry {
-    /// No ray enters its box before this distance.
+    /// Lower bound of the distance at which any ray enters the box.
     near: f32,
     child: u32,
-    /// A bit for each ray that meets its box.
+    /// Bit mask of the rays that meet the box.
     rays: u32,
 }
 
-/// A batch of rays.
+/// A batch of rays to be traced in packets.
 pub(super) struct InPackets<'w, W, B> {
     pub tree: &'w Tree<'w>,
     pub shapes: &'w Shapes,
     pub batch: &'w mut W,
     pub stack: &'w mut [StackEntry],
     pub cache: &'w mut BlockCache,
-    /// For rays that go by themselves.
+    /// Stack for rays that are traced alone.
     pub entries: &'w mut [Entry],
     pub margins: PhantomData<B>,
 }
 
-/// What packets are traced through, and who takes their answers.
+/// Tree, memory and batch that all packets share.
 struct PacketTrace<'w, W> {
     tree: &'w Tree<'w>,
     shapes: &'w Shapes,
@@ -83,52 +84,51 @@ struct PacketTrace<'w, W> {
     single: SingleRays,
 }
 
-/// `N` rays that run alike.
+/// Packet of `N` rays that run alike.
 #[repr(C, align(64))]
 struct Packet<B, const N: usize> {
     rays: PacketRays<B, N>,
     found: Found<N>,
-    /// Where their ranges end.
+    /// End of each ray's range.
     t_max: [f32; N],
-    /// Number of the first ray.
+    /// Index of the first ray in the batch.
     start: usize,
-    /// Rays that still look for something.
+    /// Bit mask of the rays that are not answered yet.
     active: u32,
 }
 
-/// What was found so far.
+/// Best hits so far.
 #[repr(C, align(64))]
 struct Found<const N: usize> {
-    /// [`NO_PRIM`] where nothing was found.
+    /// Prim that is hit, or [`NO_PRIM`].
     prim: [u32; N],
-    /// Where that is, block and lane, so that its corners are not looked up again.
+    /// Packed block and lane of the hit, so that its corners are not looked up again.
     place: [u32; N],
 }
 
-/// How far the rays look, in lanes: what every test changes and the next one needs.
+/// Reach of the rays, in lanes: the state that every test updates and the next one needs.
 struct Reach<T: Lanewise<N>, const N: usize> {
-    /// The exact distances of the best hits lie between these, as in `best`. Without a hit: infinite, and the end of the
-    /// ray's range.
+    /// Bounds of the exact distances of the best hits, as in `best`. Without a hit: infinite, and the end of the ray's range.
     low: T::Lanes,
     high: T::Lanes,
-    /// Boxes are entered up to here.
+    /// Distances up to which boxes are entered.
     limit: T::Lanes,
-    /// The greatest of these.
+    /// Largest of `limit`.
     farthest: f32,
 }
 
-/// How the rays see triangles.
+/// View of triangles by the rays.
 enum Seen<T: Lanewise<N>, const N: usize> {
-    /// All from one place.
+    /// All rays from one origin.
     Together(Fan<T, N>),
     Apart(RowSight<T, N>),
 }
 
-/// How many rays visit the nodes and leaves of packets together.
+/// Average number of rays per visit of a packet.
 #[derive(Clone, Copy, Debug, Default)]
 struct Occupancy {
     visits: u32,
-    /// Rays that visit them, summed.
+    /// Rays over all visits, summed.
     rays: u32,
 }
 
@@ -179,8 +179,7 @@ impl<W: QueryBatch, B: BoxMargins> Kernel for InPackets<'_, W, B> {
 }
 
 impl Occupancy {
-    /// Whether half of `N` rays and more visit what they visit, on the average: then they are better off together than in
-    /// halves.
+    /// Whether on average at least half of `N` rays take part in a visit: then they are faster together than in halves.
     fn is_close<const N: usize>(self) -> bool {
         2 * u64::from(self.rays) >= u64::from(self.visits) * N as u64
     }
@@ -197,13 +196,13 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         }
     }
 
-    /// All rays that are taken from now on are of a pencil.
+    /// Prepares for rays of a pencil only.
     fn start_at(&mut self, origin: Vec3) {
         self.rays.start_at(origin);
         self.t_max = [f32::MAX; N];
     }
 
-    /// Answers the rays that were taken, or as many as there are: those of a mask together.
+    /// Answers the gathered rays, or as many as there are: those in `alike` as a packet, the others one by one.
     #[inline(always)]
     fn pass<S: Simd, T: Lanewise<N>, W: QueryBatch>(
         &mut self,
@@ -223,7 +222,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         occupancy
     }
 
-    /// Takes the rays from `start` on, if there are as many, and tells which of them run alike.
+    /// Loads the rays from `start` on, if there are enough, and returns a mask of those that run alike.
     #[inline(always)]
     fn gather<S: Simd, T: Lanewise<N>, W: QueryBatch>(
         &mut self,
@@ -246,7 +245,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         self.rays.prepare(wide, trace.tree, &self.t_max)
     }
 
-    /// From the root to every leaf that any of these rays may hit. The others get an answer, too, which means nothing.
+    /// Traverses from the root to every leaf that any ray in `alike` may hit. The other rays get meaningless answers.
     #[inline(always)]
     fn trace<S: Simd, T: Lanewise<N>, W: QueryBatch>(
         &mut self,
@@ -297,12 +296,12 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
                 }
             } else {
                 let below = top;
-                // The entry point is no node of the tree.
+                // The entry point is not a node of the tree.
                 let node = tree.nodes.get(branch.child as usize).unwrap_or(&trace.entry_point.node);
                 self.push(s, wide, (tree, node), branch.rays, &reach, (trace.stack, &mut top));
                 nearer = top > below;
             }
-            // Those that meet the nearest child were just found; rays that need no more have no limit above zero.
+            // Rays that meet the nearest child were just found, and answered rays have no limit above zero.
             if !nearer && !drop_unneeded(wide, &reach, trace.stack, &mut top) {
                 break;
             }
@@ -313,7 +312,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         occupancy
     }
 
-    /// Tests a leaf.
+    /// Visits a leaf and tests its prims.
     #[inline(always)]
     fn visit<S: Simd, T: Lanewise<N>, W: QueryBatch>(
         &mut self,
@@ -337,7 +336,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         reach.farthest = wide.latest(reach.limit);
     }
 
-    /// Puts the children that some ray meets on the stack, the nearest last.
+    /// Pushes the children that any ray meets, the nearest last.
     #[inline(always)]
     fn push<S: Simd, T: Lanewise<N>>(
         &self,
@@ -358,18 +357,18 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         for _ in 0..met.count_ones() {
             let slot = (order & 7) as usize;
             order >>= 4;
-            // Fetched while the rays are asked about its box.
+            // Prefetched while the box is tested against the rays.
             let child = node.children[slot];
             let (at, block) = Child::either(child);
             s.prefetch_either(Child::is_leaf(child), (tree.blocks, block), (tree.nodes, at));
-            // The only one is visited for the rays that visit the node: mostly there are some for it.
+            // A single child is visited by all rays that visit the node: mostly some of them meet it.
             let met = if only { rays } else { bundle.meet_child(wide, node, slot, reach.limit) & rays };
             stack[*top] = StackEntry { near: near[slot], child, rays: met };
             *top += usize::from(met != 0);
         }
     }
 
-    /// Tests the triangles of a block, and tells which rays have new hits.
+    /// Tests the triangles of a block, and returns a mask of the rays with new hits.
     #[inline(always)]
     fn test<S: Simd, T: Lanewise<N>, W: QueryBatch>(
         &mut self,
@@ -401,7 +400,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         }
     }
 
-    /// Tests the triangles of a mask, and tells which of the rays have new hits.
+    /// Tests the triangles of a mask, and returns a mask of the rays with new hits.
     #[inline(always)]
     fn test_each<T: Lanewise<N>, W: QueryBatch, R: Rows<T, N>>(
         &mut self,
@@ -430,8 +429,8 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         changed
     }
 
-    /// Offers the hits of rays with a triangle, between two distances where they are certain; which of them are the best
-    /// now.
+    /// Offers the hits of rays with a triangle, with bounds of the distance where they are certain; returns a mask of those
+    /// that are now the best.
     #[inline(always)]
     fn take<T: Lanewise<N>, W: QueryBatch>(
         &mut self,
@@ -455,7 +454,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             let gone = self.passing(trace.shapes, trace.batch, prim, better);
             (better, hit) = (better & !gone, hit & !gone);
         }
-        // The exact test decides about distances that may be equal, and about what lanes cannot tell.
+        // The exact test decides on distances that may be equal, and on verdicts that lanes leave open.
         let in_time = s.at_most(low, reach.high) & s.at_most(t_min, high);
         let mut open = hit & in_time & !better | unsure;
         if !opaque && better != 0 {
@@ -487,7 +486,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         changed
     }
 
-    /// The rays of a mask that pass a prim that they meet, as one that is not there.
+    /// Bit mask of those rays in `rays` that the filter lets pass through a prim that they hit.
     #[cold]
     #[inline(never)]
     fn passing<W: QueryBatch>(&self, shapes: &Shapes, batch: &W, prim: u32, rays: u32) -> u32 {
@@ -495,14 +494,14 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         batch.filter().filter(|_| open).map_or(0, |filter| filter.rejects_of(self.start, rays, prim))
     }
 
-    /// The rays of a mask that mind being hit by a prim that is not opaque.
+    /// Bit mask of those rays in `rays` for which a hit with a non-opaque prim counts.
     #[cold]
     #[inline(never)]
     fn minding<W: QueryBatch>(&self, batch: &W, prim: u32, rays: u32) -> u32 {
         those(rays, |ray| batch.goal(self.start + ray).minds(false, prim))
     }
 
-    /// Where the rays of a mask meet what they hit.
+    /// Exact distances and barycentric coordinates of the hits of the rays in `left`.
     #[inline(always)]
     fn meet_each<T: Lanewise<N>>(&self, s: T, tree: &Tree, mut left: u32) -> Meetings<T::Lanes> {
         let mut corners = [[s.splat(0.0); 3]; 3];
@@ -521,7 +520,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         meet(s, [s.load(&o[0]), s.load(&o[1]), s.load(&o[2])], [s.load(&d[0]), s.load(&d[1]), s.load(&d[2])], corners)
     }
 
-    /// Gives the answers, all distances and weights together.
+    /// Hands over the answers, with all distances and barycentric coordinates computed together.
     #[inline(always)]
     fn answer<S: Simd, T: Lanewise<N>, W: QueryBatch>(&mut self, s: S, wide: T, trace: &mut PacketTrace<W>) {
         let (start, found, tree) = (self.start, &self.found, trace.tree);
@@ -560,8 +559,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     }
 }
 
-/// Takes off the stack what no ray needs any more, and tells whether anything is left: on top of it a child, for the rays that
-/// need it.
+/// Pops entries that no ray needs any more, and returns whether any is left: then the top entry is for the rays that need it.
 #[inline(always)]
 fn drop_unneeded<T: Lanewise<N>, const N: usize>(
     wide: T,

@@ -1,4 +1,4 @@
-//! Rays of a packet by axis: what bounds them all, and which of them meet a box.
+//! Rays of a packet by axis: their common bounds, and tests against boxes.
 
 use std::marker::PhantomData;
 
@@ -13,35 +13,35 @@ use crate::math::meetings::RowBounds;
 use crate::math::shear::main_axis;
 use crate::math::simd::{LANES, Lanewise, Row, Simd};
 
-/// A bit for every ray of a packet of `N`.
+/// Bit mask of all rays of a packet of `N`.
 pub(super) const fn all<const N: usize>() -> u32 {
     u32::MAX >> (u32::BITS as usize - N)
 }
 
-/// The rays, by axis; as boxes see them by padded slabs (`padded`). Rows lie in whole cache lines: numbers that are read or
-/// written across two take twice as long.
+/// Rays of a packet, by axis, prepared for padded slabs (`padded`). Rows are aligned to whole cache lines: accesses across
+/// two lines take twice as long.
 #[repr(C, align(64))]
 pub(super) struct PacketRays<B, const N: usize> {
     pub origin: [[f32; N]; 3],
     pub dir: [[f32; N]; 3],
     inverse: [[f32; N]; 3],
-    /// What is added to planes that come first, and to those that come last.
+    /// Summands for entry planes, and for exit planes.
     first: [[f32; N]; 3],
     last: [[f32; N]; 3],
-    /// Where hits count, inclusive.
+    /// Smallest t of a hit, inclusive.
     pub t_min: [f32; N],
-    /// Where boxes matter; not below zero.
+    /// Distances from which boxes are entered; not negative.
     from: [f32; N],
     pub exclude: [u32; N],
-    /// All rays as one.
+    /// Bounds of all rays.
     interval: IntervalRay,
-    /// Bit k is set where the rays run backwards along axis k.
+    /// Bit k is set if the rays run backwards along axis k.
     pub octant: usize,
     /// Axis of the largest component of every direction.
     pub z: usize,
-    /// The origin, where all rays have the same.
+    /// Common origin of the rays, if they share one.
     pub common: Option<Vec3>,
-    /// All origins lie between these.
+    /// Bounds of all origins.
     low: Vec3,
     high: Vec3,
     margins: PhantomData<B>,
@@ -69,7 +69,7 @@ impl<B: BoxMargins, const N: usize> PacketRays<B, N> {
         }
     }
 
-    /// Takes the rays; how far each of them looks.
+    /// Loads the rays, and returns the ends of their ranges.
     #[inline(always)]
     pub(super) fn spread<S: Simd, T: Lanewise<N>>(&mut self, s: S, lanes: T, rays: &[Ray; N]) -> [f32; N] {
         (self.z, self.octant, self.common) = (main_axis(rays[0].dir), octant_of(rays[0].dir), None);
@@ -86,17 +86,17 @@ impl<B: BoxMargins, const N: usize> PacketRays<B, N> {
         for (exclude, ray) in self.exclude.iter_mut().zip(rays) {
             *exclude = ray.exclude;
         }
-        // A distance that overflows is no hit; a NaN stays one.
+        // An overflowing distance is no hit; a NaN stays NaN.
         lanes.store(lanes.smaller(lanes.splat(f32::MAX), lanes.load(&t_max)))
     }
 
-    /// All rays that are taken from now on start here, and have all of their ranges.
+    /// Gives all rays from now on this origin and unbounded ranges.
     pub(super) fn start_at(&mut self, origin: Vec3) {
         self.origin = [[origin.x; N], [origin.y; N], [origin.z; N]];
         (self.t_min, self.exclude, self.common) = ([0.0; N], [NO_PRIM; N], Some(origin));
     }
 
-    /// Takes rays of a pencil by their directions, from `start` on; whether there are as many.
+    /// Loads rays of a pencil by their directions, from `start` on; returns whether there are enough.
     #[inline(always)]
     pub(super) fn turn(&mut self, dirs: [&[f32]; 3], start: usize) -> bool {
         let row = |k: usize| dirs[k].get(start..).and_then(<[f32]>::first_chunk);
@@ -107,9 +107,8 @@ impl<B: BoxMargins, const N: usize> PacketRays<B, N> {
         true
     }
 
-    /// Finds slabs and ranges from origins, directions, `t_min` and `t_max`, and which rays run as the first does: to the
-    /// same octant, the same component the largest; with numbers for which the bounds of padded boxes hold, and not
-    /// backwards.
+    /// Computes slabs and ranges, and returns a mask of the rays that run like the first one: with the same octant and main
+    /// axis, with numbers for which the bounds of padded boxes hold, and not with a negative range.
     #[inline(always)]
     pub(super) fn prepare<T: Lanewise<N>>(&mut self, s: T, tree: &Tree, t_max: &[f32; N]) -> u32 {
         let (t_min, t_max, zero) = (s.load(&self.t_min), s.load(t_max), s.splat(0.0));
@@ -133,7 +132,7 @@ impl<B: BoxMargins, const N: usize> PacketRays<B, N> {
         alike & all::<N>()
     }
 
-    /// Puts a ray that runs alike in the place of each that does not, so that nothing bounds those.
+    /// Replaces each ray that diverges by one that runs alike, so that it does not affect the bounds.
     #[inline(always)]
     pub(super) fn fill<T: Lanewise<N>>(&mut self, s: T, alike: u32, t_max: &mut [f32; N]) {
         let lane = alike.trailing_zeros() as usize % N;
@@ -143,7 +142,7 @@ impl<B: BoxMargins, const N: usize> PacketRays<B, N> {
         }
     }
 
-    /// Which rays meet a box up to their limits; by axis, its plane that comes first and the one that comes last.
+    /// Bit mask of the rays that meet a box up to their limits; `first` and `last` are its entry and exit planes by axis.
     #[inline(always)]
     pub(super) fn meet<T: Lanewise<N>>(&self, s: T, first: [f32; 3], last: [f32; 3], limit: T::Lanes) -> u32 {
         let (mut near, mut far) = (s.load(&self.from), limit);
@@ -155,13 +154,13 @@ impl<B: BoxMargins, const N: usize> PacketRays<B, N> {
         s.in_order(near, far)
     }
 
-    /// 1 over the largest component of each direction.
+    /// Reciprocal of the largest component of each direction.
     #[inline(always)]
     pub(super) fn per_length(&self) -> &[f32; N] {
         &self.inverse[self.z % 3]
     }
 
-    /// Finds what bounds all rays.
+    /// Computes the bounds of all rays.
     #[inline(always)]
     pub(super) fn bound<T: Lanewise<N>>(&mut self, s: T, tree: &Tree) {
         match self.common {
@@ -179,7 +178,7 @@ impl<B: BoxMargins, const N: usize> PacketRays<B, N> {
         self.interval = IntervalRay::new::<B>(tree, self.octant, [least.into(), greatest.into()], origins, from);
     }
 
-    /// Finds what bounds all origins.
+    /// Computes the bounds of all origins.
     #[inline(always)]
     fn bound_origins<T: Lanewise<N>>(&mut self, s: T) {
         let first = Vec3::new(self.origin[0][0], self.origin[1][0], self.origin[2][0]);
@@ -199,7 +198,7 @@ impl<B: BoxMargins, const N: usize> PacketRays<B, N> {
         }
     }
 
-    /// Bounds of origins and directions, as exact distances need them.
+    /// Bounds of origins and directions, for exact distances.
     #[inline(always)]
     pub(super) fn row_bounds(&self) -> RowBounds {
         // A reciprocal is rounded once.
@@ -212,13 +211,14 @@ impl<B: BoxMargins, const N: usize> PacketRays<B, N> {
         }
     }
 
-    /// Which of eight boxes any ray may meet up to `limit`, and the least distances of that; planes in the order of a node's.
+    /// Least entry distances of eight boxes, and the mask of those that any ray may meet up to `limit`; planes in the order
+    /// of a node's.
     #[inline(always)]
     pub(super) fn meets_any<S: Simd>(&self, s: S, planes: &[Row; 6], limit: f32) -> (S::Lanes, u32) {
         self.interval.meets(s, planes, self.octant, limit)
     }
 
-    /// Whose triangles' own boxes any ray may meet, of a block.
+    /// Bit mask of the triangles of a block whose own boxes any ray may meet.
     #[inline(always)]
     pub(super) fn meets_any_triangle<S: Simd>(&self, s: S, block: &Block, limit: f32) -> u32 {
         let [a, b, c] = &block.corners;
@@ -232,7 +232,7 @@ impl<B: BoxMargins, const N: usize> PacketRays<B, N> {
         self.interval.between(s, first, last, limit).1
     }
 
-    /// Which rays meet the box of a child up to their limits.
+    /// Bit mask of the rays that meet the box of a child up to their limits.
     #[inline(always)]
     pub(super) fn meet_child<T: Lanewise<N>>(&self, s: T, node: &Node, slot: usize, limit: T::Lanes) -> u32 {
         let back = |k: usize| self.octant >> k & 1;

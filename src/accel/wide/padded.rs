@@ -1,15 +1,14 @@
-//! A ray against the eight boxes of a node, each a little larger than it is: one operation a plane.
+//! Slab test of a ray against the eight boxes of a node, each slightly padded: one operation per plane.
 //!
-//! The distance to a plane is plane · (1/d) − o/d, which errs by parts of the coordinates' sizes instead of parts of
-//! itself: that is what [`BOX_PAD`](crate::math::bounds::BOX_PAD) is for. A ray meets the padded box of whatever it hits, up
-//! to the error of the hit's own distance, which `limit` allows for. Rays with numbers too large or too small for that
-//! ([`BOX_RANGE`]) go by `slabs`.
+//! The distance to a plane is plane · (1/d) − o/d, whose error is relative to the coordinates and not to the distance:
+//! [`BOX_PAD`](crate::math::bounds::BOX_PAD) allows for it. A ray meets the padded box of any prim that it hits, up to the
+//! error of the hit's own distance, which `limit` allows for. Rays with numbers too large or too small ([`BOX_RANGE`]) use
+//! `slabs`.
 //!
-//! Hits count from a distance of zero on, or a later one, and a box that holds one is left later than that, if only by what
-//! [`PARALLEL`] adds to the pad: at the start nothing of it is used up, and over a direction's component it is more than any
-//! underflow, above 2⁻¹⁰³. So what lies behind the start need not be told apart, and distances are compared by their bits:
-//! a processor has the greater of two words sooner than that of two numbers. A ray whose hits may lie behind its start goes
-//! by `slabs`.
+//! Hits have distances of at least zero, and the exit from a box that holds a hit is later than the hit, if only by what
+//! [`PARALLEL`] adds to the pad: at the start none of it is used up, and over a direction's component it is more than any
+//! underflow, above 2⁻¹⁰³. So negative distances need no exact order, and distances are compared by their bits: an integer
+//! maximum is faster than that of floats. A ray whose hits may lie behind its start uses `slabs`.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -18,34 +17,34 @@ use super::slabs::BoxMargins;
 use crate::math::bounds::{BOX_RANGE, PARALLEL};
 use crate::math::simd::{LANES, Lanewise, Pick, Simd};
 
-/// A ray ready to be tested against padded boxes.
+/// A ray prepared for tests against padded boxes.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct PaddedSlabs {
     pub inverse: [f32; 3],
-    /// Boxes are entered from here on; not below zero.
+    /// Distance from which boxes are entered; not negative.
     pub from: f32,
-    /// What is added to planes that come first.
+    /// Summands for entry planes.
     pub first: [f32; 3],
-    /// Boxes are entered up to here while nothing is hit.
+    /// Distance up to which boxes are entered before any hit.
     pub limit: f32,
-    /// What is added to planes that come last.
+    /// Summands for exit planes.
     pub last: [f32; 3],
-    /// The octant that the ray runs to: bit k is set where it runs backwards along axis k.
+    /// Octant of the direction: bit k is set if the ray runs backwards along axis k.
     pub octant: u32,
 }
 
-/// The padded slabs of rays in lanes, by axis.
+/// Padded slabs of rays in lanes, by axis.
 pub(super) struct Padding<L> {
     pub inverse: [L; 3],
     pub first: [L; 3],
     pub last: [L; 3],
-    /// The rays for which the bounds hold.
+    /// Bit mask of the rays for which the bounds hold.
     pub allowed: u32,
 }
 
 impl<L: Copy> Padding<L> {
-    /// Of rays with these origins and directions, for boxes whose largest coordinate is `extent`.
+    /// Computes the slabs of rays with these origins and directions, for boxes whose largest coordinate is `extent`.
     #[inline(always)]
     pub(super) fn of<B: BoxMargins, S: Lanewise<N, Lanes = L>, const N: usize>(
         s: S,
@@ -55,7 +54,7 @@ impl<L: Copy> Padding<L> {
     ) -> Self {
         let (extent, zero) = (s.splat(extent), s.splat(0.0));
         let (far, size) = ([s.abs(o[0]), s.abs(o[1]), s.abs(o[2])], [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])]);
-        // Sums keep a NaN.
+        // A sum keeps a NaN.
         let whole = s.add(extent, s.add(s.add(far[0], far[1]), far[2]));
         let length = s.add(s.add(size[0], size[1]), size[2]);
         let (least, most) = (s.splat(1.0 / BOX_RANGE), s.splat(BOX_RANGE));
@@ -74,7 +73,7 @@ impl<L: Copy> Padding<L> {
     }
 }
 
-/// Rows of the planes that come first, by octant.
+/// Rows of the entry planes, by octant.
 pub(super) static FIRST: [[Pick; 3]; LANES] = {
     let mut rows = [[Pick::new(0); 3]; LANES];
     let mut octant = 0;
@@ -86,7 +85,7 @@ pub(super) static FIRST: [[Pick; 3]; LANES] = {
 };
 
 impl PaddedSlabs {
-    /// In lanes, for many nodes.
+    /// Broadcasts the slabs to lanes, for many nodes.
     #[inline(always)]
     pub(super) fn spread<S: Simd>(&self, s: S) -> SlabLanes<S> {
         let [ix, iy, iz] = self.inverse;
@@ -100,14 +99,14 @@ impl PaddedSlabs {
         }
     }
 
-    /// The distances at which the ray enters the boxes of a node, and which of them it meets up to `limit`.
+    /// Entry distances of the ray into the boxes of a node, and the mask of those it meets up to `limit`.
     #[inline(always)]
     pub(super) fn meets<S: Simd>(&self, s: S, node: &Node, limit: f32) -> (S::Lanes, u32) {
         self.spread(s).meets(s, node, limit)
     }
 }
 
-/// [`PaddedSlabs`] in lanes.
+/// [`PaddedSlabs`] broadcast to lanes.
 pub(super) struct SlabLanes<S: Simd> {
     inverse: [S::Lanes; 3],
     first: [S::Lanes; 3],
@@ -117,7 +116,7 @@ pub(super) struct SlabLanes<S: Simd> {
 }
 
 impl<S: Simd> SlabLanes<S> {
-    /// As [`PaddedSlabs::meets`].
+    /// [`PaddedSlabs::meets`] for broadcast slabs.
     #[inline(always)]
     pub(super) fn meets(&self, s: S, node: &Node, limit: f32) -> (S::Lanes, u32) {
         let ([x, y, z], [ix, iy, iz]) = (self.rows, self.inverse);
@@ -127,7 +126,7 @@ impl<S: Simd> SlabLanes<S> {
         let last_x = s.mul_add(s.pick(&node.planes, x.other()), ix, self.last[0]);
         let last_y = s.mul_add(s.pick(&node.planes, y.other()), iy, self.last[1]);
         let last_z = s.mul_add(s.pick(&node.planes, z.other()), iz, self.last[2]);
-        // Where a plane is met at −0, what comes second stays: zero or later.
+        // Where a plane is met at −0, the second operand stays: zero or later.
         let near = s.later(s.later(first_x, first_y), s.later(first_z, self.from));
         let far = s.sooner(s.sooner(last_x, last_y), s.sooner(last_z, s.splat(limit)));
         (near, s.in_order(near, far))

@@ -1,4 +1,4 @@
-//! Exact distances and weights of hits that are known, eight rays at a time.
+//! Exact distances and barycentric coordinates of known hits, eight rays at a time.
 
 use super::best::TriangleSlot;
 use super::node::Tree;
@@ -11,10 +11,10 @@ use crate::math::simd::{LANES, Simd};
 use crate::math::triangle;
 use crate::math::triangles::corners_of;
 
-/// Rays whose hits wait for their distances.
+/// Rays whose hits wait for their exact distances.
 pub(super) struct PendingHits {
     pairs: Pairs,
-    /// Their numbers in the batch, and what they hit.
+    /// Indices of the rays in the batch, and the prims they hit.
     rays: [usize; LANES],
     prims: [u32; LANES],
     count: usize,
@@ -27,7 +27,7 @@ impl Default for PendingHits {
 }
 
 impl PendingHits {
-    /// Gives a ray its answer, now or with others.
+    /// Answers a ray, at once or together with others.
     #[inline(always)]
     pub(super) fn answer<S: Simd, W: QueryBatch>(
         &mut self,
@@ -59,7 +59,7 @@ impl PendingHits {
         }
     }
 
-    /// Answers those that wait.
+    /// Answers the waiting rays.
     #[inline(always)]
     pub(super) fn finish<S: Simd, W: QueryBatch>(&mut self, s: S, batch: &mut W) {
         let count = std::mem::replace(&mut self.count, 0);
@@ -78,7 +78,7 @@ impl PendingHits {
         }
     }
 
-    /// The hit of one ray by the scalar form.
+    /// Hit of one ray, computed in scalar arithmetic.
     #[cold]
     #[inline(never)]
     fn exactly<W: QueryBatch>(&self, batch: &W, lane: usize) -> Hit {

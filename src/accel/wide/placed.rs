@@ -1,6 +1,6 @@
-//! The way of a ray through the tree of an object that stands somewhere in the scene.
+//! Traversal of the tree of a placed object by a ray of the scene.
 //!
-//! Boxes are asked in the object's frame, triangles in the scene's: [`ObjectTransform`] says why no hit is lost.
+//! Boxes are tested in the object's frame, triangles in the scene's: [`ObjectTransform`] has the proof that no hit is lost.
 
 use super::node::{Block, Child, Tree};
 use super::padded::PaddedSlabs;
@@ -17,9 +17,9 @@ use crate::math::simd::{Kernel, LANES, Simd};
 use crate::math::triangles::{RayLanes, reach};
 
 impl Wide<'_> {
-    /// Tests at least every triangle that the ray hits within its reach, of an object of triangles that stands at `place`
-    /// and whose triangles have the numbers from `first` on; whether that answered the query. By the exact test, whether
-    /// or not a triangle is wanted.
+    /// Tests at least every triangle that the ray hits within its reach, of an object of triangles at `place` whose triangles
+    /// are numbered from `first` on; returns whether that answered the query. Uses the exact test, and does not ask whether a
+    /// triangle is wanted.
     pub(in crate::accel) fn walk_placed<G: Goal, P: Probe>(
         &self,
         place: &ObjectTransform,
@@ -51,15 +51,15 @@ impl Wide<'_> {
     }
 }
 
-/// Where an object stands, and what its triangles are called there.
+/// Place of an object, and the number of its first triangle.
 #[derive(Clone, Copy)]
 struct Spot<'w> {
     place: &'w ObjectTransform,
     first: u32,
 }
 
-/// The padded boxes of an object's tree as a ray of the scene meets them; `None` for one with numbers that are too large
-/// or too small there.
+/// Padded slabs of a ray of the scene in the frame of a placed object; `None` if its numbers are too large or too small
+/// there.
 fn slabs_of(tree: &Tree, place: &ObjectTransform, ray: &RaySpace, t_min: f32) -> Option<PaddedSlabs> {
     let (origin, dir) = (place.carried(ray.origin).as_vec3(), place.carried_dir(ray.dir).as_vec3());
     let (far, size) = (origin.abs(), dir.abs());
@@ -89,7 +89,7 @@ struct Descent<'w, 'q, G: Goal, P, V> {
     query: &'w mut Query<'q, G>,
     stack: &'w mut [Entry],
     probe: &'w mut P,
-    /// What is said of a child that is visited.
+    /// Makes the record of a visit to a child.
     visit: V,
 }
 
@@ -137,7 +137,7 @@ impl<G: Goal, P: Probe, V: Fn(u32) -> Visit> Kernel for Descent<'_, '_, G, P, V>
     }
 }
 
-/// Tests the triangles of a block where they stand, and tells whether the query is answered.
+/// Tests the triangles of a block in the scene's frame, and returns whether the query is answered.
 #[inline(always)]
 fn test<S: Simd, G: Goal, P: Probe>(
     s: S,
@@ -152,7 +152,7 @@ fn test<S: Simd, G: Goal, P: Probe>(
     let mut prims = block.prims;
     let mut count = 0;
     for prim in &mut prims {
-        // Lanes without a triangle come last.
+        // Unused lanes come last.
         count += u32::from(*prim != crate::accel::NO_PRIM);
         *prim = prim.wrapping_add(first);
     }

@@ -1,4 +1,4 @@
-//! Eight rays of a batch made ready together, for kernels that then trace each by itself.
+//! Preparation of eight rays of a batch at once, for kernels that trace each of them alone.
 
 use super::node::Tree;
 use super::padded::{PaddedSlabs, Padding};
@@ -10,24 +10,24 @@ use crate::math::sight::Sight;
 use crate::math::simd::{LANES, Row, Simd};
 use bytemuck::{Pod, Zeroable};
 
-/// A ray as boxes and blocks see it: rows of four numbers, which lanes write at once.
+/// A ray prepared for boxes and blocks: rows of four numbers, each of which is stored at once.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct PreparedRay {
     pub slabs: PaddedSlabs,
     pub sight: Sight,
-    /// Hits count up to here.
+    /// Largest t of a hit.
     pub t_max: f32,
 }
 
-/// Eight rays.
+/// Eight prepared rays.
 pub(super) struct PreparedRays {
     pub rays: [PreparedRay; LANES],
-    /// Their hits count from here.
+    /// Smallest t of a hit.
     pub t_min: Row,
-    /// What they do not hit.
+    /// Excluded prims.
     pub exclude: [u32; LANES],
-    /// Those for which the bounds of padded boxes hold, and whose range is not empty.
+    /// Bit mask of the rays for which the bounds of padded boxes hold, and whose range is not empty.
     pub allowed: u32,
 }
 
@@ -38,7 +38,7 @@ impl Default for PreparedRays {
 }
 
 impl PreparedRays {
-    /// Takes the rays of a batch from `start` on, of which there is one at least.
+    /// Prepares the rays of a batch from `start` on, of which there must be at least one.
     #[inline(always)]
     pub(super) fn take<B: BoxMargins, S: Simd, W: QueryBatch>(&mut self, s: S, tree: &Tree, batch: &W, start: usize) {
         let rays = &batch.rays()[start..];
@@ -51,7 +51,7 @@ impl PreparedRays {
         self.t_min = s.store(t_min);
         batch.adapt_t_min(start, &mut self.t_min[..rays.len().min(LANES)]);
         let t_min = s.load(&self.t_min);
-        // A distance that overflows is no hit; a NaN stays.
+        // An overflowing distance is no hit; a NaN stays NaN.
         let t_max = s.smaller(s.splat(f32::MAX), t_max);
         let zero = s.splat(0.0);
         let (from, limit) = (s.greater(B::started_lanes(s, t_min), zero), B::widened_lanes(s, t_max));
@@ -85,13 +85,13 @@ impl PreparedRays {
     }
 }
 
-/// One word in all lanes, by its bits.
+/// The bits of one word, in all lanes.
 #[inline(always)]
 fn word<S: Simd>(s: S, word: u32) -> S::Lanes {
     s.splat(f32::from_bits(word))
 }
 
-/// The octants that rays run to which run backwards along the axes in the lanes of these masks: words, by their bits.
+/// Octants of rays that run backwards along the axes in the lanes of these masks: words, by their bits.
 #[inline(always)]
 fn octants<S: Simd>(s: S, [x, y, z]: [u32; 3]) -> S::Lanes {
     let along_z = [
@@ -112,7 +112,7 @@ pub(super) struct Columns<S: Simd> {
 }
 
 impl<S: Simd> Columns<S> {
-    /// Eight rays of a pencil from `start` on.
+    /// Loads the eight rays of a pencil from `start` on.
     #[inline(always)]
     fn of_pencil(s: S, pencil: &Pencil, start: usize) -> Self {
         let (Vec3 { x: ox, y: oy, z: oz }, dirs) = (pencil.origin, pencil.eight(start));
@@ -124,7 +124,7 @@ impl<S: Simd> Columns<S> {
         }
     }
 
-    /// The first eight rays, the last repeated where there are fewer.
+    /// Loads the first eight rays, the last repeated where there are fewer.
     #[inline(always)]
     pub(super) fn of(s: S, rays: &[Ray]) -> Self {
         let last = rays.len() - 1;
@@ -135,7 +135,7 @@ impl<S: Simd> Columns<S> {
     }
 }
 
-/// The first of three in the lanes of the first mask, the second in those of the second, else the third.
+/// Selects `of[0]` in the lanes of the first mask, `of[1]` in those of the second, else `of[2]`.
 #[inline(always)]
 fn turned<S: Simd>(s: S, of: [S::Lanes; 3], [first, second]: [u32; 2]) -> S::Lanes {
     s.choose(first, of[0], s.choose(second, of[1], of[2]))
@@ -179,7 +179,7 @@ mod tests {
         level.run(Take(tree, &ClosestBatch { rays, pencil: None, filter: None, hits: &mut [], test: Exact }, start))
     }
 
-    /// Prepares a ray by plain numbers: what lanes are compared with.
+    /// Prepares a ray by scalar arithmetic, the reference for lanes.
     fn plainly(tree: &Tree, ray: &Ray) -> (PreparedRay, f32) {
         let (space, _) = RaySpace::checked(ray.origin, ray.dir);
         let parallel = ray.dir.abs().max_element() * PARALLEL;
@@ -209,12 +209,12 @@ mod tests {
         (ready, ray.t_min)
     }
 
-    /// A prepared ray of a lane, with its reach.
+    /// Prepared ray of a lane, with its `t_min`.
     fn of(ready: &PreparedRays, lane: usize) -> (PreparedRay, f32) {
         (ready.rays[lane], ready.t_min[lane])
     }
 
-    /// Of all octants and main axes, also with equal components and zeros, some with ranges.
+    /// Rays of all octants and main axes, also with equal components and zeros, some with ranges.
     fn ordinary() -> Vec<Ray> {
         let mut random = Random::new(61);
         let part = |random: &mut Random| [1.0, -1.0, 0.0, -0.0, 1e-12, -1e-30, random.cube().x][random.below(7)];

@@ -1,4 +1,4 @@
-//! Rays one after another through a tree of blocks alone, as fast as one ray goes.
+//! Rays one after another through a tree of blocks alone, tuned for the speed of a single ray.
 
 use std::marker::PhantomData;
 
@@ -13,7 +13,7 @@ use crate::accel::query::Goal;
 use crate::accel::query_batch::QueryBatch;
 use crate::math::simd::{Kernel, LANES, Simd};
 
-/// A batch of rays.
+/// A batch of rays to be traced one by one.
 pub(super) struct TraceSingle<'w, W, B> {
     pub tree: &'w Tree<'w>,
     pub shapes: &'w Shapes,
@@ -36,7 +36,7 @@ impl<W: QueryBatch, B: BoxMargins> Kernel for TraceSingle<'_, W, B> {
     }
 }
 
-/// Rays that go alone, eight made ready and eight answered together.
+/// Rays traced alone, but prepared and answered eight at a time.
 #[derive(Default)]
 pub(super) struct SingleRays {
     ready: PreparedRays,
@@ -44,7 +44,7 @@ pub(super) struct SingleRays {
 }
 
 impl SingleRays {
-    /// Of eight rays of a batch from `start` on, or as many as there are, traces those of a mask.
+    /// Traces the rays of a mask among the eight rays of a batch from `start` on, or as many as there are.
     #[inline(always)]
     pub(super) fn trace<B: BoxMargins, S: Simd, W: QueryBatch>(
         &mut self,
@@ -76,14 +76,14 @@ impl SingleRays {
         }
     }
 
-    /// Answers those that wait for it.
+    /// Answers the waiting rays.
     #[inline(always)]
     pub(super) fn finish<S: Simd, W: QueryBatch>(&mut self, s: S, batch: &mut W) {
         self.pending.finish(s, batch);
     }
 }
 
-/// From the root to every leaf that the ray may hit, the nearest first.
+/// Traverses from the root to every leaf that the ray may hit, the nearest first.
 #[inline(always)]
 fn descend<B: BoxMargins, S: Simd, W: QueryBatch>(
     s: S,
@@ -97,7 +97,7 @@ fn descend<B: BoxMargins, S: Simd, W: QueryBatch>(
     let slabs = ray.slabs.spread(s);
     let (mut child, mut top) = (0, 0);
     loop {
-        // A loop of its own: what it needs stays in registers.
+        // A separate loop keeps its state in registers.
         while !Child::is_leaf(child) {
             let node = &tree.nodes[child as usize];
             let (near, met) = slabs.meets(s, node, seeker.limit);
@@ -114,8 +114,8 @@ fn descend<B: BoxMargins, S: Simd, W: QueryBatch>(
     }
 }
 
-/// Descends with a ray that any hit answers: how far it looks never changes, so that children need no distances, and to put
-/// them in order takes longer than it saves.
+/// Traverses with a ray that any hit answers: its limit never changes, so children need no distances, and sorting them takes
+/// longer than it saves.
 #[inline(always)]
 fn descend_any<B: BoxMargins, S: Simd, W: QueryBatch>(
     s: S,
@@ -156,8 +156,8 @@ fn descend_any<B: BoxMargins, S: Simd, W: QueryBatch>(
     }
 }
 
-/// As [`walk::pop`](super::walk::pop): distances are not below zero here, so that their bits are in their order, and words
-/// are compared sooner than numbers.
+/// [`walk::pop`](super::walk::pop) with distances that are not negative, so that their bits have the same order, and words
+/// compare faster than floats.
 #[inline(always)]
 fn pop(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
     while *top > 0 {
@@ -170,7 +170,7 @@ fn pop(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
     None
 }
 
-/// As [`walk::nearest`](super::walk::nearest), by the bits of distances.
+/// [`walk::nearest`](super::walk::nearest), by the bits of distances.
 #[inline(always)]
 fn nearest<S: Simd>(s: S, node: &Node, near: S::Lanes, mut met: u32, stack: &mut [Entry], top: &mut usize) -> u32 {
     let lane = met.trailing_zeros() as usize % LANES;
@@ -186,7 +186,7 @@ fn nearest<S: Simd>(s: S, node: &Node, near: S::Lanes, mut met: u32, stack: &mut
         let next = (near[lane], node.children[lane]);
         met &= met - 1;
         let farther = if next.0 < nearest.0 { std::mem::replace(&mut nearest, next) } else { next };
-        // Insertion: the farther ones lie deeper.
+        // Insertion sort: farther entries lie deeper.
         let mut at = *top;
         while at > bottom && stack[at - 1].near.to_bits() < farther.0 {
             stack[at] = stack[at - 1];

@@ -1,11 +1,10 @@
-//! A ray against the eight boxes of a node.
+//! Slab test of a ray against the eight boxes of a node.
 //!
 //! # Why no hit is lost
 //! A prim lies in the boxes above it, exactly: they are made of its own `f32` coordinates. The distances to a box's planes
-//! err by [`SLAB_F32`] at most, relative, and [`BOX_UNDERFLOW`], so a box is entered whenever the exact ray meets it within
-//! its range, widened by [`BOX_MARGIN`]. Only where that holds are boxes asked at all: a direction whose reciprocal is
-//! not a normal number constrains nothing on its axis, and with coordinates beyond [`BOX_COORDINATES`] every prim is
-//! tested.
+//! err by at most [`SLAB_F32`], relative, and [`BOX_UNDERFLOW`], so a box is entered whenever the exact ray meets it within
+//! its range, widened by [`BOX_MARGIN`]. Boxes are tested only where that holds: a direction component whose reciprocal is
+//! not a normal number constrains nothing on its axis, and with coordinates beyond [`BOX_COORDINATES`] every prim is tested.
 
 use std::marker::PhantomData;
 
@@ -14,36 +13,36 @@ use crate::math::Vec3;
 use crate::math::bounds::{BOX_COORDINATES, BOX_MARGIN, BOX_PAD, BOX_UNDERFLOW, SLAB_F32};
 use crate::math::simd::{Lanewise, Pick, Simd};
 
-/// What a walk allows for.
+/// Safety margins of a walk.
 pub(in crate::accel) trait BoxMargins {
     /// Relative error of a distance to a plane.
     const SLAB: f32 = SLAB_F32;
-    /// How far beyond the ray's range boxes are entered, relative.
+    /// Relative amount by which the ray's range is widened for boxes.
     const RANGE: f32 = BOX_MARGIN;
-    /// What underflow adds to either.
+    /// Absolute addition to both for underflow.
     const UNDERFLOW: f32 = BOX_UNDERFLOW;
-    /// How much larger than they are boxes are taken to be by [`PaddedSlabs`](super::padded::PaddedSlabs).
+    /// Relative padding of boxes in [`PaddedSlabs`](super::padded::PaddedSlabs).
     const PAD: f32 = BOX_PAD;
-    /// Largest coordinate with which boxes are asked.
+    /// Largest coordinate with which boxes are tested.
     const COORDINATES: f32 = BOX_COORDINATES;
     /// Whether walks are compiled for every instruction set, or for vectors alone
     /// ([`Level::run_vectors`](crate::math::simd::Level::run_vectors)).
     const EVERY_LEVEL: bool = false;
 
-    /// Whether boxes can be asked about a ray from here; not if it is not finite.
+    /// Whether boxes can be tested against a ray from this origin; not if it is not finite.
     #[inline(always)]
     fn allow(tree: &Tree, origin: Vec3) -> bool {
         let inside = |x: f32| x.abs() <= Self::COORDINATES;
         inside(origin.x) & inside(origin.y) & inside(origin.z) & (tree.extent <= Self::COORDINATES)
     }
 
-    /// The distance up to which boxes must be entered for hits up to `reach`.
+    /// Distance up to which boxes must be entered for hits up to `reach`.
     #[inline(always)]
     fn widened(reach: f32) -> f32 {
         reach + reach.abs() * Self::RANGE + Self::UNDERFLOW
     }
 
-    /// The distance from which on boxes must be entered for hits from `t_min` on.
+    /// Distance from which boxes must be entered for hits from `t_min` on.
     #[inline(always)]
     fn started(t_min: f32) -> f32 {
         t_min - t_min.abs() * Self::RANGE - Self::UNDERFLOW
@@ -62,19 +61,19 @@ pub(in crate::accel) trait BoxMargins {
     }
 }
 
-/// The margins that `math::bounds` derives.
+/// Margins derived in `math::bounds`.
 pub(in crate::accel) struct Derived;
 
 impl BoxMargins for Derived {
     const EVERY_LEVEL: bool = true;
 }
 
-/// A ray ready to be tested against boxes.
+/// A ray prepared for box tests.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slabs<B> {
     origin: [f32; 3],
     inverse: [f32; 3],
-    /// Rows of the planes that come first on each axis, and of those that come last.
+    /// Rows of the entry planes on each axis, and of the exit planes.
     first: [Pick; 3],
     last: [Pick; 3],
     from: f32,
@@ -95,13 +94,13 @@ impl<B: BoxMargins> Slabs<B> {
         }
     }
 
-    /// The distances at which the ray enters the boxes of a node, and which of them it meets up to `limit`.
+    /// Entry distances of the ray into the boxes of a node, and the mask of those it meets up to `limit`.
     #[inline(always)]
     pub(super) fn meets<S: Simd>(&self, s: S, node: &Node, limit: f32) -> (S::Lanes, u32) {
         let (mut near, mut far) = (s.splat(self.from), s.splat(limit));
         for k in 0..3 {
             let (origin, inverse) = (s.splat(self.origin[k]), s.splat(self.inverse[k]));
-            // The second operand is kept where the first is NaN.
+            // If the first operand is NaN, the second is kept.
             near = s.greater(s.mul(s.sub(s.pick(&node.planes, self.first[k]), origin), inverse), near);
             far = s.smaller(s.mul(s.sub(s.pick(&node.planes, self.last[k]), origin), inverse), far);
         }
@@ -117,7 +116,7 @@ fn reciprocal(d: f32) -> f32 {
     if inverse.is_normal() || d == 0.0 { inverse } else { f32::NAN }
 }
 
-/// 1 where the ray runs backwards, so that the upper plane comes first.
+/// 1 if the ray runs backwards, so that the upper plane is the entry plane.
 #[inline(always)]
 pub(super) fn backwards(d: f32) -> usize {
     usize::from(d.is_sign_negative())

@@ -1,58 +1,59 @@
-//! The cut of least expected cost by surface area, in bins.
+//! Binned split of least expected cost by surface area.
 
 use super::item::{Bounds, Item, around_middles};
 use super::{Cut, halves};
 use crate::math::{Mat4, Vec4};
 use rayon::prelude::*;
 
-/// Bins of each axis.
+/// Number of bins per axis.
 const BINS: usize = 16;
 
-/// Half the bins do for so few items.
+/// Up to this many items, half the bins suffice.
 const FEW: usize = 16;
 
-/// Of more items than these only one in so many is put into bins: that finds a cut as good, and memory is read less often.
+/// Above this many items, only one in `STRIDE` is binned: the splits are as good, and less memory is read.
 const MANY: usize = 1 << 11;
 const STRIDE: usize = 4;
 
-/// More items than these are cut by several threads, halves of them at a time; and so many are put into bins at a time. The
-/// same for every number of threads: so is the order of items.
+/// Above this many items, several threads partition halves of them, and bin `CHUNK` at a time. The same for every number of
+/// threads, and so is the order of items.
 const SHARED: usize = 1 << 16;
 const CHUNK: usize = STRIDE << 12;
 
-/// Adding it to a small number leaves its nearest integer in the lowest bits.
+/// Adding this to a small number leaves its nearest integer in the lowest bits.
 const TO_INTEGER: f32 = (1 << 23) as f32;
 
-/// What part of the cost of a set a leaf's tests are, against those of its prims: a leaf is tested at once, full or not.
+/// Weight of the tests of whole leaves in the cost of a set, relative to those of its prims: a leaf is tested at once, full
+/// or not.
 const WHOLE_LEAVES: f32 = 0.5;
 
-/// Boxes and numbers of what falls into each of `N` bins, on the three axes.
+/// Boxes and counts of the items in each of `N` bins, on the three axes.
 #[derive(Clone, Copy)]
 struct Bins<const N: usize> {
     bounds: [[Bounds; 3]; N],
     counts: [[i32; 4]; N],
 }
 
-/// Where bins begin, and how many there are for a unit of length.
+/// Origin of the bins, and their number per unit of length.
 #[derive(Clone, Copy)]
 struct Ruler {
     lo: Vec4,
     scale: Vec4,
 }
 
-/// Where a set is cut.
+/// Split of a set between two bins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct SplitPlane {
     axis: usize,
-    /// The first of the second part.
+    /// First bin of the second part.
     bin: usize,
-    /// What both parts cost.
+    /// Cost of both parts.
     cost: f32,
 }
 
 impl Ruler {
     fn over(middles: &Bounds, bins: usize) -> Self {
-        // A little less than all bins, so that the last middle is in the last one.
+        // Slightly fewer than all bins, so that the last middle falls into the last one.
         let per_unit = |extent: f32| match extent {
             e if e > 0.0 && e.is_finite() => bins as f32 * (1.0 - 1.0 / 1024.0) / e,
             _ => 0.0,
@@ -62,13 +63,13 @@ impl Ruler {
         Self { lo: middles.lo, scale }
     }
 
-    /// The axis on which middles lie farthest apart.
+    /// Axis on which the middles are farthest apart.
     fn longest_axis(&self) -> usize {
         let scale = self.scale.to_array().map(|scale| if scale > 0.0 { scale } else { f32::INFINITY });
         (1..3).fold(0, |longest, axis| if scale[axis] < scale[longest] { axis } else { longest })
     }
 
-    /// The bins of an item on the three axes, plus [`TO_INTEGER`].
+    /// Bins of an item on the three axes, plus [`TO_INTEGER`].
     #[inline(always)]
     fn place(&self, item: &Item) -> Vec4 {
         let place = (item.middle() - self.lo) * self.scale - Vec4::splat(0.5);
@@ -79,7 +80,7 @@ impl Ruler {
 impl<const N: usize> Bins<N> {
     const EMPTY: Self = Self { bounds: [[Bounds::EMPTY; 3]; N], counts: [[0; 4]; N] };
 
-    /// Of some of many items.
+    /// Bins a sample of many items.
     fn of_many(items: &[Item], ruler: &Ruler) -> Self {
         let some = |items: &[Item]| {
             let mut bins = Self::EMPTY;
@@ -115,7 +116,7 @@ impl<const N: usize> Bins<N> {
         }
     }
 
-    /// The cut of least cost; `None` if each leaves a part empty. What an empty part costs is no number, and never less.
+    /// Split of least cost; `None` if every split leaves a part empty. The cost of an empty part is NaN, and never less.
     fn cheapest(&self, leaf: u32) -> Option<SplitPlane> {
         let mut after = [Vec4::ZERO; N];
         let mut part = Sides::EMPTY;
@@ -134,12 +135,12 @@ impl<const N: usize> Bins<N> {
             }
         }
         let axes = (0..3).filter(|&k| at[k] > 0);
-        // The first of equals.
+        // The first of equal ones.
         let axis = axes.reduce(|a, b| if least[b] < least[a] { b } else { a })?;
         Some(SplitPlane { axis, bin: usize::from(at[axis]), cost: least[axis] })
     }
 
-    /// Area of the box around all, which is cut there.
+    /// Area of the box around all items, computed at the split.
     fn area(&self, axis: usize, bin: usize) -> f32 {
         let [first, second] = self.parts(axis, bin);
         first.join(second).area()
@@ -151,7 +152,7 @@ impl<const N: usize> Bins<N> {
     }
 }
 
-/// What lies on one side of a place, on each axis.
+/// Items on one side of a position, on each axis.
 struct Sides {
     bounds: [Bounds; 3],
     counts: [i32; 4],
@@ -166,7 +167,7 @@ impl Sides {
         self.counts.iter_mut().zip(counts).for_each(|(all, count)| *all += count);
     }
 
-    /// What they cost: [`Bounds::area`] times [`weight`], of the three axes in lanes.
+    /// Cost of the items: [`Bounds::area`] times [`weight`], with the three axes in lanes.
     #[inline(always)]
     fn costs(&self, leaf: u32) -> Vec4 {
         let [a, b, c] = self.bounds.map(|b| b.hi - b.lo);
@@ -175,7 +176,7 @@ impl Sides {
     }
 }
 
-/// What a set of so many costs where leaves hold up to `leaf`, a power of two.
+/// Cost of a set of `count` prims where leaves hold up to `leaf`, a power of two.
 #[inline(always)]
 #[expect(clippy::cast_precision_loss, reason = "a cost")]
 pub(in crate::accel) fn weight(count: i32, leaf: i32) -> f32 {
@@ -183,13 +184,13 @@ pub(in crate::accel) fn weight(count: i32, leaf: i32) -> f32 {
     count as f32 + WHOLE_LEAVES * whole_leaves as f32
 }
 
-/// Cuts at least two items between bins of their middles, on the axis and at the place of least cost, where leaves hold up
-/// to `leaf` of them, a power of two; both parts are not empty. `middles` is the box around their middles, where known.
+/// Splits at least two items between bins of their middles, on the axis and at the position of least cost, where leaves hold
+/// up to `leaf` prims, a power of two; neither part is empty. `middles` is the box around their middles, if known.
 pub(in crate::accel) fn cut_by_area(items: &mut [Item], leaf: u32, middles: Option<Bounds>) -> Cut {
     if items.len() <= FEW { cut_in::<{ BINS / 2 }>(items, leaf, middles) } else { cut_in::<BINS>(items, leaf, middles) }
 }
 
-/// Cuts items between two of `N` bins.
+/// Splits items between two of `N` bins.
 fn cut_in<const N: usize>(items: &mut [Item], leaf: u32, middles: Option<Bounds>) -> Cut {
     let many = items.len() > MANY;
     let ruler = Ruler::over(&middles.unwrap_or_else(|| around_middles(items)), N);
@@ -201,7 +202,8 @@ fn cut_in<const N: usize>(items: &mut [Item], leaf: u32, middles: Option<Bounds>
     }
     let (axis, bin) = match bins.cheapest(leaf) {
         None => return halves(items),
-        // The box of all has no area, of prims on a line or so small that it underflows: all cuts cost as little.
+        // The box of all items has no area, because the prims are on a line or so small that it underflows: all splits cost
+        // the same.
         Some(SplitPlane { axis, bin, cost: 0.0 }) if bins.area(axis, bin) == 0.0 => (ruler.longest_axis(), N / 2),
         Some(SplitPlane { axis, bin, .. }) => (axis, bin),
     };
@@ -214,12 +216,12 @@ fn cut_in<const N: usize>(items: &mut [Item], leaf: u32, middles: Option<Bounds>
         let prims = bins.counts[..bin].iter().map(|counts| counts[axis]).sum::<i32>().cast_unsigned() as usize;
         Cut { at: partition(items, is_first), prims, bounds: bins.parts(axis, bin), middles: None }
     };
-    // Only where differences of places overflow, or their parts of a bin, is one part empty.
+    // A part can be empty only where differences of positions, or their fractions of a bin, overflow.
     if cut.at == 0 || cut.at == items.len() { halves(items) } else { cut }
 }
 
-/// Moves the items for which `first` holds to the front; how many there are. Nothing depends on a branch, which could not
-/// be foreseen.
+/// Moves the items for which `first` holds to the front, and returns their number. Free of branches, which would be
+/// unpredictable.
 fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
     let mut at = 0;
     for i in 0..items.len() {
@@ -230,14 +232,14 @@ fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
     at
 }
 
-/// Partitions items by several threads, and finds the boxes of both parts.
+/// Partitions items by several threads, and computes the boxes of both parts.
 fn shared_partition(items: &mut [Item], first: &(impl Fn(&Item) -> bool + Sync)) -> Cut {
     if items.len() <= SHARED {
         return measured_partition(items, first);
     }
     let (front, back) = items.split_at_mut(items.len() / 2);
     let (a, b) = rayon::join(|| shared_partition(front, first), || shared_partition(back, first));
-    // What is at the wrong end of each half changes places.
+    // Swaps the misplaced items at the ends of the halves.
     let count = (front.len() - a.at).min(b.at);
     let seconds = front[a.at..][..count].par_chunks_mut(CHUNK);
     seconds.zip(back[b.at - count..b.at].par_chunks_mut(CHUNK)).for_each(|(a, b)| a.swap_with_slice(b));
@@ -246,7 +248,7 @@ fn shared_partition(items: &mut [Item], first: &(impl Fn(&Item) -> bool + Sync))
     Cut { at: a.at + b.at, prims: a.prims + b.prims, bounds: both(a.bounds, b.bounds), middles }
 }
 
-/// Partitions items by one thread, and finds the boxes of both parts.
+/// Partitions items by one thread, and computes the boxes of both parts.
 fn measured_partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> Cut {
     let (mut at, mut prims, mut bounds, mut middles) = (0, 0, [Bounds::EMPTY; 2], [Bounds::EMPTY; 2]);
     for i in 0..items.len() {
@@ -269,7 +271,7 @@ mod tests {
     use crate::math::aabb::Aabb;
     use crate::math::random::Random;
 
-    /// The cheapest cut by its definition: axis by axis, place by place, the boxes of both parts made anew.
+    /// Cheapest split by its definition: axis by axis, bin by bin, with the boxes of both parts computed anew.
     fn defined<const N: usize>(bins: &Bins<N>, leaf: u32) -> Option<SplitPlane> {
         let mut best: Option<SplitPlane> = None;
         for axis in 0..3 {
@@ -364,7 +366,7 @@ mod tests {
             prims.sort_unstable();
             prims
         };
-        // From hardly any in the first part to nearly all.
+        // From hardly any items in the first part to nearly all.
         for place in [-3.9, -1.0, 0.0, 2.0, 3.99] {
             let is_first = |item: &Item| item.bounds().lo.x < place;
             let (mut one, mut several) = (items.clone(), items.clone());

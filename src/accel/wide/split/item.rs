@@ -1,4 +1,4 @@
-//! Prims on their way into a tree, and boxes in registers of four lanes.
+//! Items of the tree builder, and boxes in registers of four lanes.
 
 use crate::accel::Shapes;
 use crate::math::aabb::Aabb;
@@ -6,15 +6,15 @@ use crate::math::{Vec3, Vec4};
 use bytemuck::Zeroable;
 use std::ops::Range;
 
-/// A box whose fourth lanes mean nothing.
+/// A box with unused fourth lanes.
 #[derive(Clone, Copy, Debug, Zeroable)]
 pub(in crate::accel) struct Bounds {
     pub lo: Vec4,
     pub hi: Vec4,
 }
 
-/// A prim, or two that follow each other, and the box around them, 32 bytes. The fourth lanes hold the number of the first
-/// in the lowest bits of two ordinary numbers: the processor is slow with the tiny numbers that most integers are as floats.
+/// A prim, or two consecutive ones, with their box, in 32 bytes. The fourth lanes hold the number of the first prim in the
+/// lowest bits of two normal floats: the processor is slow with the subnormal numbers that most integers are as floats.
 #[derive(Clone, Copy, Debug, Zeroable)]
 pub(in crate::accel) struct Item(Bounds);
 
@@ -26,20 +26,20 @@ impl Bounds {
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
-    /// With another point.
+    /// Extends the box to a point.
     #[inline(always)]
     pub(in crate::accel) fn with(self, point: Vec4) -> Self {
         Self { lo: self.lo.min(point), hi: self.hi.max(point) }
     }
 
-    /// What a box costs: half its surface. Nothing sensible where it is empty.
+    /// Cost of a box: half its surface area. Meaningless for an empty box.
     #[inline(always)]
     pub(in crate::accel) fn area(&self) -> f32 {
         let d = self.hi - self.lo;
         d.x * d.y + d.z * (d.x + d.y)
     }
 
-    /// Of what is in it.
+    /// Volume of the box.
     #[inline(always)]
     pub(in crate::accel) fn volume(&self) -> f32 {
         let d = self.hi - self.lo;
@@ -61,14 +61,14 @@ impl From<Aabb> for Bounds {
     }
 }
 
-/// Bits of a prim's number beside the lower corner; the others are beside the upper one.
+/// Number of bits of a prim's number beside the lower corner; the rest is beside the upper one.
 const LOW_BITS: u32 = 23;
 const LOW: u32 = (1 << LOW_BITS) - 1;
 
-/// The bit beside the upper corner that says there are two.
+/// Bit beside the upper corner that marks an item of two prims.
 const TWO: u32 = 1 << (LOW_BITS - 1);
 
-/// Two are taken together where the box around them has no more than this part of the areas of both boxes.
+/// Two prims are joined if their common box has at most this fraction of the areas of both boxes.
 const TOGETHER: f32 = 0.75;
 
 impl Item {
@@ -77,7 +77,7 @@ impl Item {
         Self::numbered(bounds.into(), prim, 0)
     }
 
-    /// Prim `prim` in the box around it.
+    /// Item of prim `prim`, with its box.
     #[inline(always)]
     pub(in crate::accel) fn of(shapes: &Shapes, prim: u32) -> Self {
         match shapes.triangles.get(prim as usize) {
@@ -86,10 +86,11 @@ impl Item {
         }
     }
 
-    /// Items of neighbouring triangles, from number `first` on, put at the front of as many `places`; how many they are.
+    /// Makes items of neighbouring triangles, numbered from `first` on, at the front of as many `places`; returns their
+    /// count.
     ///
-    /// Neighbours in a file are mostly neighbours in space, and many are the halves of a quad. Two in one item are half as
-    /// much work, and leaves are as good.
+    /// Neighbours in a file are mostly neighbours in space, and many are the halves of a quad. Pairing them halves the work,
+    /// and leaves are as good.
     pub(in crate::accel) fn in_pairs(
         shapes: &Shapes,
         first: u32,
@@ -131,43 +132,43 @@ impl Item {
         bits(self.0.lo.w) | (bits(self.0.hi.w) & !TWO) << LOW_BITS
     }
 
-    /// How many prims: 1 or 2.
+    /// Number of prims: 1 or 2.
     #[inline(always)]
     pub(in crate::accel) fn count(&self) -> u32 {
         1 + u32::from(self.0.hi.w.to_bits() & TWO != 0)
     }
 
-    /// All its prims.
+    /// The prims of the item.
     #[inline(always)]
     pub(in crate::accel) fn prims(&self) -> Range<u32> {
         self.prim()..self.prim() + self.count()
     }
 
-    /// The middle of the box, doubled.
+    /// Centre of the box, doubled.
     #[inline(always)]
     pub(in crate::accel) fn middle(&self) -> Vec4 {
         self.0.lo + self.0.hi
     }
 }
 
-/// Corners are finite: registers need not take care of what is no number, as `Aabb` does.
+/// Box of a triangle. Corners are finite: NaN needs no care, unlike in `Aabb`.
 #[inline(always)]
 fn around_triangle(shapes: &Shapes, corners: [u32; 3]) -> Bounds {
     let [a, b, c] = shapes.corners(corners).map(|corner| corner.extend(0.0));
     Bounds { lo: a.min(b).min(c), hi: a.max(b).max(c) }
 }
 
-/// How many prims are in them.
+/// Number of prims in the items.
 pub(in crate::accel) fn count(items: &[Item]) -> usize {
     items.iter().map(|item| item.count() as usize).sum()
 }
 
-/// The box around all items.
+/// Box around all items.
 pub(in crate::accel) fn around(items: &[Item]) -> Bounds {
     items.iter().fold(Bounds::EMPTY, |b, i| b.join(i.bounds()))
 }
 
-/// The box around the middles, doubled.
+/// Box around the doubled middles of all items.
 pub(in crate::accel) fn around_middles(items: &[Item]) -> Bounds {
     items.iter().fold(Bounds::EMPTY, |b, i| b.with(i.middle()))
 }
@@ -189,7 +190,7 @@ mod tests {
         }
     }
 
-    /// The first prim of each item that is made of these triangles, from number 7 on, and how many it has.
+    /// First prim and number of prims of each item made of these triangles, which are numbered from 7 on.
     fn paired(corners: &[[Vec3; 3]]) -> Vec<(u32, u32)> {
         let shapes =
             scenes::mesh(corners.concat(), (0..).step_by(3).map(|v| [v, v + 1, v + 2]).take(corners.len()).collect());
@@ -212,7 +213,7 @@ mod tests {
         assert_eq!(paired(&[a, away(b)]), [(7, 1), (8, 1)]);
         assert_eq!(paired(&[away(b), a, b]), [(7, 1), (8, 2)]);
         assert_eq!(paired(&[a, b, away(a), away(b), a]), [(7, 2), (9, 2), (11, 1)]);
-        // Of three that lie together the first two are taken.
+        // Of three triangles that lie together the first two are paired.
         assert_eq!(paired(&[a, b, a]), [(7, 2), (9, 1)]);
         assert_eq!(paired(&[]), []);
     }

@@ -1,4 +1,4 @@
-//! Where a set of prims is cut in two.
+//! Splitting a set of prims in two.
 
 pub(in crate::accel) mod area;
 pub(in crate::accel) mod item;
@@ -6,28 +6,28 @@ pub(in crate::accel) mod item;
 pub(in crate::accel) use area::cut_by_area;
 pub(in crate::accel) use item::{Bounds, Item, around};
 
-/// Who decides where to cut.
+/// Choice of the split planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Splitting {
-    /// Planes of the cells of a uniform grid refined by octrees; in small cells as below.
+    /// Planes of the cells of a uniform grid refined by octrees; small cells are split by surface area.
     Octree,
     /// Least expected cost by surface area (J. MacDonald, K. Booth, *Heuristics for Ray Tracing Using Space Subdivision*,
     /// 1990), in bins (I. Wald, *On Fast Construction of SAH-based Bounding Volume Hierarchies*, 2007).
     SurfaceArea,
 }
 
-/// A cut: items before `at` have the first box, the others the second.
+/// A split: items before `at` have the first box, the others the second.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::accel) struct Cut {
     pub at: usize,
-    /// How many prims the first part has.
+    /// Number of prims in the first part.
     pub prims: usize,
     pub bounds: [Bounds; 2],
-    /// Around the doubled middles of both parts, where that cost nothing to find out.
+    /// Boxes around the doubled middles of both parts, if they were free to compute.
     pub middles: Option<[Bounds; 2]>,
 }
 
-/// Items that nothing separates: half each, in the order of the prims.
+/// Splits inseparable items in two halves, in the order of the prims.
 fn halves(items: &mut [Item]) -> Cut {
     items.sort_unstable_by_key(Item::prim);
     let at = items.len() / 2;
@@ -65,7 +65,7 @@ mod tests {
     fn leaves_are_filled_rather_than_halves_made_equal() {
         let mut items = items(&std::array::from_fn::<f32, 20, _>(|i| i as f32));
         assert_eq!(cut_by_area(&mut items.clone(), 1, None).at, 10);
-        // Of 8 and 12 the larger needs no more leaves than a half does.
+        // Of parts of 8 and 12, the larger needs no more leaves than half the items do.
         assert!([8, 12].contains(&cut_by_area(&mut items, 8, None).at));
     }
 
