@@ -7,7 +7,7 @@
 use super::bounds::SLAB;
 use super::{DVec3, Vec3};
 
-/// A closed box; empty where `lo > hi`.
+/// A closed axis-aligned box; empty where `lo > hi`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
     /// Smallest corner.
@@ -17,36 +17,36 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// Nothing.
+    /// The empty box.
     pub const EMPTY: Self = Self { lo: Vec3::INFINITY, hi: Vec3::NEG_INFINITY };
 
-    /// The smallest box around `points`.
+    /// Smallest box around `points`.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
         points.into_iter().fold(Self::EMPTY, |b, p| b.union(Self { lo: p, hi: p }))
     }
 
-    /// The smallest box around both.
+    /// Smallest box around both.
     pub fn union(self, other: Self) -> Self {
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
-    /// What is in both; empty where they do not meet.
+    /// Intersection of both; empty where they are disjoint.
     pub fn intersection(self, other: Self) -> Self {
         Self { lo: self.lo.max(other.lo), hi: self.hi.min(other.hi) }
     }
 
-    /// Larger by so much on every side.
+    /// The box enlarged by `by` on every side.
     pub fn padded(self, by: f32) -> Self {
         Self { lo: self.lo - by, hi: self.hi + by }
     }
 
-    /// Whether it holds no point.
+    /// Whether the box contains no point.
     pub fn is_empty(&self) -> bool {
         !self.lo.cmple(self.hi).all()
     }
 
-    /// The part of t_min..=t_max inside the box, widened by the rounding of its own arithmetic so that it holds every
-    /// point of the box on the ray. `inv_dir` is 1/dir in `f64`, where the reciprocal of no `f32` overflows but zero's.
+    /// Part of t_min..=t_max inside the box, widened by the rounding of its own arithmetic so that it contains every point of
+    /// the box on the ray. `inv_dir` is 1/dir in `f64`, where only the reciprocal of zero overflows for an `f32`.
     #[inline]
     pub fn span(&self, origin: Vec3, inv_dir: DVec3, t_min: f64, t_max: f64) -> Option<(f64, f64)> {
         self.span_within(origin, inv_dir, t_min, t_max, SLAB)
@@ -61,7 +61,7 @@ impl Aabb {
             let (first, last) = if backwards { (self.hi[k], self.lo[k]) } else { (self.lo[k], self.hi[k]) };
             let enter = (f64::from(first) - f64::from(origin[k])) * inv_dir[k];
             let leave = (f64::from(last) - f64::from(origin[k])) * inv_dir[k];
-            // `max` and `min` drop a NaN operand.
+            // `max` and `min` ignore a NaN operand.
             near = near.max((enter * (1.0 - slab)).min(enter * (1.0 + slab)));
             far = far.min((leave * (1.0 - slab)).max(leave * (1.0 + slab)));
         }
@@ -108,10 +108,10 @@ mod tests {
         assert!(!hits(Vec3::new(2.0, 0.5, 0.5), Vec3::new(f32::from_bits(1), 0.0, 0.0)));
     }
 
-    /// Rays that run exactly through a corner of a box and are said to miss it.
+    /// Number of rays exactly through a corner of a box that the test reports as missing it.
     fn lost(slab: f64) -> usize {
         let mut random = Random::new(9);
-        // Multiples of 2⁻¹²: their differences are exact, and so is the way from an origin to a corner.
+        // Multiples of 2⁻¹²: their differences are exact, and so is the vector from an origin to a corner.
         let mut point = || (random.cube() * 4096.0).round() / 4096.0;
         let misses_a_corner = |_: &usize| {
             let (lo, size, origin) = (point(), point().abs(), point() * 4.0);

@@ -1,4 +1,4 @@
-//! Every small constant of the numeric code, with where it comes from; and the one rule that uses the hit's error.
+//! Every small constant of the numeric code, with its derivation; and the offset of secondary rays, which uses a hit's error.
 //!
 //! Notation: u is the unit roundoff, fl(x) = x (1 + δ) with |δ| ≤ u. γ(n) = n u / (1 − n u) bounds the relative error of
 //! n such factors (N. Higham, *Accuracy and Stability of Numerical Algorithms*, 2002, lemma 3.1).
@@ -18,23 +18,23 @@ pub const fn gamma(n: u32) -> f32 {
     nu / (1.0 - nu)
 }
 
-/// Covers second-order terms and the rounding of the bound itself wherever a first-order bound is scaled by it: those
-/// add fewer than 20 roundings, 20 u < 2⁻¹⁰. No bound of its own: it makes proofs of those that it is part of.
+/// Covers second-order terms and the rounding of the bound itself wherever a first-order bound is scaled by it: those add
+/// fewer than 20 roundings, 20 u < 2⁻¹⁰. Not a bound of its own: it completes the proofs of the bounds it is part of.
 const SLACK: f32 = 1.0 + 1.0 / 1024.0;
 
-/// What the filter of the triangle test allows for in an edge value of sheared ray space, computed in `f32`.
+/// Margins of the triangle test's filter for an edge value of sheared ray space, computed in `f32`.
 #[derive(Clone, Copy, Debug)]
 pub struct EdgeMargins {
-    /// The unit roundoff that the bound is made of.
+    /// Unit roundoff on which the bound is based.
     pub rounding: f32,
-    /// More than every absolute error that underflow adds.
+    /// Exceeds every absolute error caused by underflow.
     pub underflow: f32,
-    /// From this bound up an edge value may have overflowed.
+    /// Error bound from which on an edge value may have overflowed.
     pub overflow: f32,
 }
 
 impl EdgeMargins {
-    /// The margins of the library, from this derivation.
+    /// Margins of the library, derived as follows.
     ///
     /// D ≥ |a − o| of the corners in the maximum norm, M ≥ their sheared |x'|, |y'|. With s = d_x/d_z, |s| ≤ 1: fl(a − o)
     /// errs by u D, fl(s) by u, their product by u, the subtraction by u M. So a sheared corner is displaced by at most
@@ -49,22 +49,22 @@ impl EdgeMargins {
     pub const DERIVED: Self =
         Self { rounding: U32 * SLACK, underflow: f32::MIN_POSITIVE, overflow: (1u128 << 100) as f32 };
 
-    /// Of triangles whose distances are wanted, too: so that the sum of edge values that are certain is so far above the
-    /// smallest numbers that their products with heights, 2⁻¹⁴⁹ off when they underflow, do not matter. They are then off
-    /// by 2⁻⁷⁹ of the sum.
+    /// Margins for triangles whose distances are wanted, too: sums of certain edge values are so far above the smallest
+    /// numbers that their products with heights, 2⁻¹⁴⁹ off when they underflow, do not matter. They are then off by 2⁻⁷⁹ of
+    /// the sum.
     pub const WITH_DISTANCES: Self = Self { underflow: 1.0 / (1u128 << 70) as f32, ..Self::DERIVED };
 
-    /// How far an edge value may be from its exact value; `reach` is D, `spread` M.
+    /// Bound of the error of an edge value; `reach` is D, `spread` M.
     #[inline(always)]
     pub fn error(&self, reach: f32, spread: f32) -> f32 {
         let displaced = 8.0 * self.rounding * (reach + reach + spread);
         displaced * (spread + 0.125 * displaced) + self.underflow
     }
 
-    /// The bound in lanes, for shears that are products with a reciprocal and err by 2 u, and for triangles whose corners are no
-    /// farther from the origin along the ray's main axis than `height`, Z. A sheared corner is then displaced by 5 u D + u M, and
-    /// d = u (5/2 D + M). As every shear is at most 1 in size, D ≤ Z + M, and with r for the rounding 8 r (5/2 Z + 7/2 M) (M + r
-    /// (5/2 Z + 7/2 M)) ≤ M (28 r M + 20 r Z) + 100 r² Z² + 196 r² M².
+    /// The bound in lanes, for shears that are products with a reciprocal and err by 2 u, and for triangles whose corners are
+    /// at most `height`, Z, from the origin along the ray's main axis. A sheared corner is then displaced by 5 u D + u M, and
+    /// d = u (5/2 D + M). As every shear is at most 1 in size, D ≤ Z + M, and with r for the rounding 8 r (5/2 Z + 7/2 M) (M
+    /// + r (5/2 Z + 7/2 M)) ≤ M (28 r M + 20 r Z) + 100 r² Z² + 196 r² M².
     #[inline(always)]
     pub fn error_by_height<S: Lanewise<N>, const N: usize>(
         &self,
@@ -80,7 +80,7 @@ impl EdgeMargins {
         s.mul_add(slope, spread, constant)
     }
 
-    /// [`Self::error`] in lanes; `reach` is D in all.
+    /// [`Self::error`] in lanes; `reach` is D in every lane.
     #[inline(always)]
     pub fn error_lanes<S: Lanewise<N>, const N: usize>(&self, s: S, reach: S::Lanes, spread: S::Lanes) -> S::Lanes {
         let displaced = s.mul(s.splat(8.0 * self.rounding), s.add(s.add(reach, reach), spread));
@@ -89,13 +89,13 @@ impl EdgeMargins {
     }
 }
 
-/// How far the mean of three heights moves when its weights err, over what `math::triangles` says it is made of.
+/// Displacement of the mean of three heights when its weights err, relative to the terms in `math::triangles`.
 pub const WEIGHTS: f32 = 3.0 * SLACK;
 
-/// What a mean of heights errs by, relative to the farthest there could be; see `math::triangles`.
+/// Error of a mean of heights, relative to the largest possible height; see `math::triangles`.
 pub const HEIGHTS: f32 = 16.0 * U32;
 
-/// What an edge value of `math::fan` errs by, relative to D G: D ≥ |a − o| of the corners, G ≥ the edges, in the maximum norm.
+/// Error of an edge value of `math::fan`, relative to D G: D ≥ |a − o| of the corners, G ≥ the edges, in the maximum norm.
 ///
 /// A component of corner × edge is two products of at most D G, of which each factor errs by u, each product and their
 /// difference by u: 8 u D G. The value is one such component and two times a shear of at most 1, which errs by 2 u: 3 · 8 u
@@ -105,163 +105,162 @@ pub const HEIGHTS: f32 = 16.0 * U32;
 /// for the corner's rounding, and 16 u D² G for three products and two sums: 46 u D² G, too.
 pub const FAN_EDGE: f32 = 46.0 * U32 * SLACK;
 
-/// The unit roundoff that the bound of an edge value in `f64` is made of.
+/// Unit roundoff on which the bound of an edge value in `f64` is based.
 pub const EDGE_ROUNDING_F64: f64 = U64 * SLACK as f64;
 
-/// As [`EdgeMargins::error`] for the same computation in `f64`, where nothing made of `f32` inputs over- or underflows.
+/// [`EdgeMargins::error`] for the same computation in `f64`, where nothing made of `f32` inputs over- or underflows.
 #[inline]
 pub fn edge_error_f64(reach: f64, spread: f64, rounding: f64) -> f64 {
     let displaced = 8.0 * rounding * (2.0 * reach + spread);
     displaced * (spread + 0.125 * displaced)
 }
 
-/// How far the sheared height y' of a corner, computed in `f64`, may be from its exact value, relative to D: displaced as
-/// in [`EdgeMargins::DERIVED`] by 4 u D + u M with M ≤ 2 D, and 1 u for second-order terms.
+/// Error of the sheared height y' of a corner, computed in `f64`, relative to D: displaced as in [`EdgeMargins::DERIVED`] by
+/// 4 u D + u M with M ≤ 2 D, and 1 u for second-order terms.
 pub const HEIGHT_F64: f64 = 7.0 * U64;
 
-/// Relative to the sum of the absolute values of its terms, how far n·a (n = e₁ × e₂; e₁, e₂, a rounded differences)
-/// is from exact in `f64`: 2 differences, product, subtraction, difference, product and 2 sums, 8 roundings.
+/// Error of n·a (n = e₁ × e₂; e₁, e₂, a rounded differences) in `f64`, relative to the sum of the absolute values of its
+/// terms: 2 differences, product, subtraction, difference, product and 2 sums, 8 roundings.
 pub const PLANE_TERMS_F64: f64 = 8.0 * U64 * (SLACK as f64);
 
-/// Relative error of approximating an exact sum by the sum of its terms' leading part, and of a quotient of two such.
-/// An approximation errs by less than 2 u (Shewchuk 1997), a quotient of two by 4 u + u; doubled.
+/// Relative error of approximating an exact sum by its terms' leading part, and of a quotient of two such sums. An
+/// approximation errs by less than 2 u (Shewchuk 1997), a quotient of two by 4 u + u; doubled.
 pub const EXACT_QUOTIENT: f64 = 10.0 * U64;
 
-/// A computed t of a planar prim is good enough to place the hit when its relative error is below this: it moves the
-/// hit by 2⁻¹⁶ of the rounding of its position to `f32`.
+/// Largest relative error with which a computed t of a planar prim may place the hit: it moves the hit by 2⁻¹⁶ of the
+/// rounding of its position to `f32`.
 pub const POSITION_T: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// How far off the mantle a point projected onto a cone may be on each axis, relative to the length of its axis plus its
-/// radius there: the unit axis errs by 4 u, the direction away from it by as much beside that, which leaves the point on
-/// the mantle of a cone turned by 8 u; place, radius and sum add 6 u.
+/// Distance from the mantle of a point projected onto a cone, on each axis, relative to the length of its axis plus its
+/// radius there: the unit axis errs by 4 u, and the direction away from it by as much in addition, which leaves the point on
+/// the mantle of a cone turned by 8 u; position, radius and sum add 6 u.
 pub const CONE_PROJECTION: f64 = 16.0 * U64;
 
-/// How much larger than they are spheres and cones are taken to be where boxes cull them, relative to their size: 2⁻⁴⁰.
+/// Relative enlargement of spheres and cones where boxes cull them: 2⁻⁴⁰ of their size.
 ///
-/// Beside the start of a ray, where a distance is no more than that, its error is absolute: where the line is a tangent, by the
-/// root of what the discriminant errs by in numbers of 106 digits, 2⁻⁴⁷ of the size for rays from within 2⁸ of it; elsewhere
-/// it is relative. The same holds for how far the line may pass the rim and count as a hit.
+/// Near the start of a ray, where a distance is no more than that, its error is absolute: at a tangent it is the root of the
+/// discriminant's error in numbers of 106 digits, 2⁻⁴⁷ of the size for rays from within 2⁸ of it; elsewhere it is relative.
+/// The same holds for how far the line may pass outside the rim and count as a hit.
 pub const ROUND_ROOM: f32 = 1.0 / (1u64 << 40) as f32;
 
-/// What the walk through cells may lag behind, relative to t: a prim not seen yet has an exact t beyond the exit of the
-/// cell, and its rounded t may be half an ulp (u) lower. Doubled twice for
-/// spheres and cones, whose t is not correctly rounded.
+/// Lag of the walk through cells, relative to t: a prim not seen yet has an exact t beyond the exit of the cell, and its
+/// rounded t may be half an ulp (u) lower. Doubled twice for spheres and cones, whose t is not correctly rounded.
 pub const WALK_MARGIN: f64 = 4.0 * U32 as f64;
 
-/// Rays whose origin is further than this many finest cells from the grid's corner are answered without culling.
+/// Rays whose origin is farther than this many finest cells from the grid's corner are answered without culling.
 pub const RAY_CELLS: f64 = (1u64 << 38) as f64;
 
-/// How much larger than it is, in finest cells, a cell is taken to be when prims are listed in it: 2⁻⁹.
+/// Padding of a cell, in finest cells, when prims are assigned to it: 2⁻⁹.
 ///
-/// The walk places a ray in `f64`. With O the distance of its origin and R that of the cell from the grid's corner: the
-/// origin is placed with 2 roundings, 2 u O; a plane is met after 4 more on their difference, 4 u (O + R); a coordinate at
-/// a distance has an error of 4 u O + 5 u R. So where the walk takes the exact ray to be in a cell, it is within
-/// 6 u O + 5 u R of it. O is below [`RAY_CELLS`], R at most 2¹⁶, and deciding which cells a prim touches errs by 2⁻⁴⁸ R:
-/// together less than 7 u [`RAY_CELLS`]. What is left of 64 is for the tests of prims that are not exact.
+/// The walk places a ray in `f64`. Let O be the distance of its origin and R that of the cell from the grid's corner: the
+/// origin is placed with 2 roundings, 2 u O; a plane is met after 4 more on their difference, 4 u (O + R); a coordinate at a
+/// distance has an error of 4 u O + 5 u R. So the exact ray is within 6 u O + 5 u R of the cell in which the walk takes it to
+/// be. O is below [`RAY_CELLS`], R at most 2¹⁶, and deciding which cells a prim touches errs by 2⁻⁴⁸ R: together less than 7
+/// u [`RAY_CELLS`]. The rest of 64 is for the tests of prims that are not exact.
 pub const CELL_PAD: f64 = 64.0 * U64 * RAY_CELLS;
 
-/// How much larger than its content the grid is on each side, relative to its extent: 2⁻⁸. Even with one cell on an axis
-/// that is more than [`CELL_PAD`], so that a ray that meets the content passes through the grid whatever is rounded.
+/// Margin by which the grid exceeds its content on each side, relative to its extent: 2⁻⁸. Even with one cell on an axis it
+/// is more than [`CELL_PAD`], so that a ray that meets the content passes through the grid despite rounding.
 pub const GRID_ROOM: f64 = 1.0 / 256.0;
 
-/// [`RAY_CELLS`] where cells and grid must be hardly larger than their content: 2³⁰.
+/// [`RAY_CELLS`] where cells and grid must hardly exceed their content: 2³⁰.
 pub const NEAR_RAY_CELLS: f64 = (1u64 << 30) as f64;
 
-/// [`CELL_PAD`] for rays from within [`NEAR_RAY_CELLS`], by the same derivation: 2⁻¹⁷. Still far above what deciding
-/// which cells a prim touches errs by, 2⁻⁴⁸ R with R at most 2¹⁶.
+/// [`CELL_PAD`] for rays from within [`NEAR_RAY_CELLS`], by the same derivation: 2⁻¹⁷. Still far above the error of deciding
+/// which cells a prim touches, 2⁻⁴⁸ R with R at most 2¹⁶.
 pub const NEAR_CELL_PAD: f64 = 64.0 * U64 * NEAR_RAY_CELLS;
 
-/// [`GRID_ROOM`] with it: 2⁻¹⁶, more than [`NEAR_CELL_PAD`] of one cell.
+/// [`GRID_ROOM`] for these: 2⁻¹⁶, more than [`NEAR_CELL_PAD`] of one cell.
 pub const NEAR_GRID_ROOM: f64 = 1.0 / 65536.0;
 
-/// What a walk through cells takes for a zero in the direction, in finest cells: no plane is met along such an axis, for
-/// 10¹²⁰ times any distance is beyond every t, and no NaN arises. Smaller numbers do not occur: 2⁻¹⁴⁹ of an `f32` times
-/// at least 2⁻¹²⁹ cells per unit.
+/// Replacement for a zero component of the direction in a walk through cells, in finest cells: no plane is met along such an
+/// axis, because 10¹²⁰ times any distance is beyond every t, and no NaN arises. Smaller numbers do not occur: 2⁻¹⁴⁹ of an
+/// `f32` times at least 2⁻¹²⁹ cells per unit.
 pub const NO_SLOPE: f64 = 1e-120;
 
 /// Widening of a slab distance so that a box is never missed: 3 roundings at either end.
 /// (T. Ize, *Robust BVH Ray Traversal*, 2013.)
 pub const SLAB: f64 = 2.0 * 3.0 * U64 / (1.0 - 3.0 * U64);
 
-/// What a distance to a box's plane in `f32`, fl(fl(plane − origin) · fl(1/d)), may be off, relative: 3 roundings. The
-/// entry of a ray that meets the box then exceeds its exit by less than twice that of either, in size; doubled again
-/// for the rounding of the comparison itself.
+/// Relative error of a distance to a box's plane in `f32`, fl(fl(plane − origin) · fl(1/d)): 3 roundings. The entry of a ray
+/// that meets the box then exceeds its exit by less than twice the error of either, in size; doubled again for the rounding
+/// of the comparison itself.
 pub const SLAB_F32: f32 = 4.0 * gamma(3);
 
-/// How far beyond the end of a ray's range a box of `f32` planes must still be entered: its entry errs by 3 u, and t by
-/// what [`WALK_MARGIN`] says.
+/// Distance beyond the end of a ray's range up to which a box of `f32` planes must still be entered, relative: its entry errs
+/// by 3 u, and t as in [`WALK_MARGIN`].
 pub const BOX_MARGIN: f32 = SLAB_F32 + WALK_MARGIN as f32;
 
-/// What underflow adds to a distance to a box's plane and to the margins above: a few times 2⁻¹⁵⁰, each. The smallest
-/// normal number is more, and quick to add.
+/// Bound of what underflow adds to a distance to a box's plane and to the margins above: a few times 2⁻¹⁵⁰, each. The
+/// smallest normal number is more, and quick to add.
 pub const BOX_UNDERFLOW: f32 = f32::MIN_POSITIVE;
 
-/// Scenes and rays with coordinates beyond this are not culled by boxes in `f32`: up to here differences do not overflow.
+/// Largest coordinate of scenes and rays that are culled by boxes in `f32`: up to here differences do not overflow.
 pub const BOX_COORDINATES: f32 = f32::MAX / 4.0;
 
-/// How much larger than they are boxes are taken to be where a distance to a plane is plane · (1/d) + (∓ pad − o/d), in
-/// parts of the sum of the largest coordinate of a box, E, and of the origin's, |o|.
+/// Padding of boxes where a distance to a plane is plane · (1/d) + (∓ pad − o/d), relative to the sum of the largest
+/// coordinate of a box, E, and of the origin's, |o|.
 ///
 /// The reciprocal, its products with plane, origin and pad, and two sums are rounded once each: u (2 |plane − o| + 2 |o| +
 /// |plane| + 3 pad) over |d|, less than 5 u (E + |o|). Directions that are nearly parallel to the plane need more
 /// ([`PARALLEL`]).
 pub const BOX_PAD: f32 = 8.0 * U32;
 
-/// Components of a direction that are smaller than this part of the largest one are taken to be as large. Within the boxes
-/// a ray goes no farther than E + |o| along its largest component, so along such an axis it moves by less than this part of
+/// Smallest component of a direction, relative to the largest one; smaller components are raised to it. Within the boxes a
+/// ray goes no farther than E + |o| along its largest component, so along such an axis it moves by less than this fraction of
 /// E and all of |o|, which is added to the pad.
 pub const PARALLEL: f32 = 1.0 / (1u32 << 30) as f32;
 
 /// Largest size of E + |o| and of a direction (sums of the sizes of components), and the reciprocal of the smallest, for
-/// which these bounds hold: reciprocals are then below 2⁶⁸ and their products below 2¹⁰⁵, edge values and heights below
-/// 2¹¹⁶, and the pad over a direction's component, what [`PARALLEL`] adds to it alone, is above 2⁻¹⁰³.
+/// which these bounds hold: reciprocals are then below 2⁶⁸ and their products below 2¹⁰⁵, edge values and heights below 2¹¹⁶,
+/// and the pad over a direction's component, of which [`PARALLEL`] alone adds as much, is above 2⁻¹⁰³.
 pub const BOX_RANGE: f32 = (1u64 << 36) as f32;
 
-/// As [`BOX_PAD`], for a ray that was carried into the frame of an object: its origin is rounded there, and its direction,
-/// u |o| and, as far as the boxes reach, u (E + |o|) more.
+/// [`BOX_PAD`] for a ray transformed into the frame of an object: its origin and direction are rounded there, which adds u
+/// |o| and, as far as the boxes reach, u (E + |o|).
 pub const PLACED_PAD: f32 = BOX_PAD + 2.0 * U32;
 
-/// What is added besides on every axis, in parts of E + |o|: what [`PARALLEL`] needs, and what carrying errs by in `f64`.
-/// With C ≤ [`PLACED_CONDITION`], a difference, three products and two sums err by less than 5 · 2⁻⁵³ C |o| in the origin,
-/// the same without the difference in the direction: 2⁻³⁴ (E + |o|) together.
+/// Further padding on every axis, relative to E + |o|: for [`PARALLEL`], and for the error of the transform in `f64`. With C
+/// ≤ [`PLACED_CONDITION`], a difference, three products and two sums err by less than 5 · 2⁻⁵³ C |o| in the origin, the same
+/// without the difference in the direction: 2⁻³⁴ (E + |o|) together.
 pub const PLACED_DRIFT: f32 = 2.0 * PARALLEL;
 
-/// The largest condition of a matrix by which rays are carried, in the maximum norm: how much longer some directions become
-/// than others.
+/// Largest condition number of a matrix by which rays are transformed, in the maximum norm: how much more some directions are
+/// stretched than others.
 pub const PLACED_CONDITION: f64 = (1u64 << 16) as f64;
 
-/// How much larger or smaller an object may become where it stands, so that ordinary rays stay within [`BOX_RANGE`].
+/// Largest factor by which a placed object may be enlarged or reduced, so that ordinary rays stay within [`BOX_RANGE`].
 pub const PLACED_SCALE: f64 = (1u64 << 24) as f64;
 
-/// How far rounding may move corners, in parts of the object's size: more than this, and boxes would cull little.
+/// Largest displacement of corners by rounding, relative to the object's size: beyond it, boxes would cull little.
 pub const PLACED_ROOM: f32 = 1.0 / 1024.0;
 
-/// How far apart two ways to find the texture coordinates at which a ray meets a face may be, both in `f32`: from the weights
-/// of the hit, and from the face's plane n·x = c and the gradients of the coordinates along it. In parts of P G ℓ + Q: P =
-/// |o| + |t d| + |c|, G the growth of a coordinate by length at most, ℓ = |d|/|n·d|, and Q the sizes of the
-/// coordinates at corners and place, of what is added to them, and of G times the corners.
+/// Largest difference between two ways, both in `f32`, to compute the texture coordinates of a hit on a face: from the
+/// barycentric weights of the hit, and from the face's plane n·x = c and the gradients of the coordinates along it. Relative
+/// to P G ℓ + Q: P = |o| + |t d| + |c|, G the largest growth of a coordinate per length, ℓ = |d|/|n·d|, and Q the sizes of
+/// the coordinates at corners and hit, of what is added to them, and of G times the corners.
 ///
-/// *Plane.* n·o errs by 4 u √3 |o| with the rounding of n, the difference to c by 9 u |o| + 2 u |c|, and n·d by 4 u ℓ in
-/// parts of itself: along the ray the place is off by less than ℓ u (9 |o| + 2 |c| + 6 |t d|), and by 2 u (|o| + |t d|) when
+/// *Plane.* n·o errs by 4 u √3 |o| with the rounding of n, the difference to c by 9 u |o| + 2 u |c|, and n·d by 4 u ℓ
+/// relative to itself: along the ray the hit is off by less than ℓ u (9 |o| + 2 |c| + 6 |t d|), and by 2 u (|o| + |t d|) when
 /// it is computed from t. Gradients, their three products and three sums add 7 u G (2 |o| + |t d|), and the coordinates at
 /// the origin, Q of size, 2 u Q: together less than 25 u P G ℓ + 2 u Q.
 ///
-/// *Weights.* Two are correctly rounded, the third errs by 2 u; three products and three sums: 8 u Q. A length of texels
-/// adds u Q. What is left of 64 is for what rounds these sizes themselves.
+/// *Weights.* Two are correctly rounded, the third errs by 2 u; three products and three sums: 8 u Q. A length of texels adds
+/// u Q. The rest of 64 is for the rounding of these sizes themselves.
 pub const FACE_COORDINATE: f32 = 64.0 * U32;
 
-/// How far from the edges of its face a secondary ray starts, in units of the error of its position.
+/// Distance of a secondary ray's start from the edges of its face, in units of the error of its position.
 ///
-/// [`offset_origin`] leaves the face by at most 3 errors. A face that rises from the edge at an angle α is at that
-/// distance from the edge higher than the start if tan α > 3/64 ([`EDGE_FOLD`]): from 2.7° on. The way there is 4·10⁻⁶ of
-/// the position.
+/// [`offset_origin`] leaves the face by at most 3 errors. A face that rises from the edge at an angle α is at that distance
+/// from the edge higher than the start if tan α > 3/64 ([`EDGE_FOLD`]): from 2.7° on. The displacement is 4·10⁻⁶ of the
+/// position.
 pub const EDGE_ROOM: f64 = 64.0;
 
-/// The tangent of the least angle at which a face may rise over another from an edge that they share, so that starts on
-/// that one lie below it.
+/// Tangent of the smallest angle at which a face may rise over another from a shared edge, so that starts on the other face
+/// lie below it.
 pub const EDGE_FOLD: f64 = 3.0 / EDGE_ROOM;
 
-/// The start of a secondary ray: outside the box `position ± error` on the side of the surface that `dir` leaves to.
+/// Start of a secondary ray: outside the box `position ± error` on the side of the surface that `dir` leaves to.
 ///
 /// `normal` is the unit geometric normal, either side. The position moves along it by Σ|nₖ| errorₖ, the support of the
 /// error box, and each moved coordinate is rounded one float outwards (M. Pharr, W. Jakob, G. Humphreys, *Physically
@@ -274,9 +273,9 @@ pub fn offset_origin(position: Vec3, error: Vec3, normal: Vec3, dir: Vec3) -> Ve
     Vec3::new(moved(position.x, offset.x), moved(position.y, offset.y), moved(position.z, offset.z))
 }
 
-/// x + way, one float further on that way; x itself where there is no way.
+/// x + way, one float farther in that direction; x itself if `way` is zero.
 ///
-/// The floats of one sign are in the order of their bits, so that the next one on a way is found without asking which it is.
+/// Floats of one sign are ordered by their bits, so that the next one in a direction is found without branching.
 #[inline(always)]
 fn moved(x: f32, way: f32) -> f32 {
     const SIGN: u32 = 1 << 31;
@@ -289,7 +288,7 @@ fn moved(x: f32, way: f32) -> f32 {
     if way.abs() > 0.0 { next } else { x }
 }
 
-/// The next float above one that is not negative; infinity where there is none, or no number.
+/// Next float above a non-negative one; infinity above the largest, and for NaN.
 #[inline(always)]
 pub(crate) fn above(x: f32) -> f32 {
     f32::from_bits(x.to_bits().min(f32::MAX.to_bits()) + 1)

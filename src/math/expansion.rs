@@ -1,7 +1,7 @@
-//! Exact sums: a number kept as a sum of `f64` terms that do not overlap.
+//! Exact sums: numbers as sums of `f64` terms that do not overlap.
 //!
-//! After J. R. Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates*, 1997. Only
-//! what the shape tests need: differences and products of `f32` inputs, up to six factors deep. Those are multiples of
+//! After J. R. Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates*, 1997. Limited
+//! to the needs of the shape tests: differences and products of `f32` inputs, up to six factors deep. Those are multiples of
 //! 2⁻⁶⁰⁰ below 2⁵²⁵, so that no product here under- or overflows and every result is exact.
 
 /// Up to `N` terms in order of growing magnitude, none zero; their exact sum is the value. Adding n scalars needs n.
@@ -15,12 +15,12 @@ impl<const N: usize> Expansion<N> {
     /// Zero.
     pub const ZERO: Self = Self { terms: [0.0; N], len: 0 };
 
-    /// The terms.
+    /// Nonzero terms, by growing magnitude.
     pub fn terms(&self) -> &[f64] {
         &self.terms[..self.len]
     }
 
-    /// Adds one number (Shewchuk's GROW-EXPANSION, with zeros left out).
+    /// Adds one number (Shewchuk's GROW-EXPANSION, without zero terms).
     pub fn add(&mut self, x: f64) {
         let mut carry = x;
         let mut kept = 0;
@@ -50,7 +50,7 @@ impl<const N: usize> Expansion<N> {
         }
     }
 
-    /// −1, 0 or 1.
+    /// Sign of the value: −1, 0 or 1.
     pub fn sign(&self) -> i32 {
         match self.terms().last() {
             Some(&x) if x > 0.0 => 1,
@@ -59,7 +59,7 @@ impl<const N: usize> Expansion<N> {
         }
     }
 
-    /// The value to within 2 u.
+    /// Value with a relative error of at most 2 u.
     pub fn approximate(&self) -> f64 {
         self.terms().iter().sum()
     }
@@ -81,7 +81,7 @@ pub type Exact3 = [Expansion<2>; 3];
 
 /// p − q, exactly.
 pub fn difference(p: [f32; 3], q: [f32; 3]) -> Exact3 {
-    // Filled in place: to map an array of such numbers copies each more than once.
+    // Filled in place: mapping an array of such numbers would copy each several times.
     let mut difference = [Expansion::ZERO; 3];
     for (k, e) in difference.iter_mut().enumerate() {
         *e = Expansion::difference(p[k], q[k]);
@@ -135,7 +135,7 @@ pub(super) fn two_product(a: f64, b: f64) -> (f64, f64) {
     (product, error)
 }
 
-/// The upper 26 bits and the rest.
+/// Splits into the upper 26 bits and the rest.
 fn split(a: f64) -> (f64, f64) {
     const SPLITTER: f64 = (1u64 << 27) as f64 + 1.0;
     let c = SPLITTER * a;

@@ -1,9 +1,9 @@
-//! What rays from one place see of triangles, by the planes through their edges and that place.
+//! Fans: rays from one origin against triangles, by the planes through the triangles' edges and that origin.
 //!
 //! As in [`sight`](super::sight), but rays that start together share more: the edge value of a ray is linear in its
-//! direction, d · (p × q) / d_z for the edge from q to p, so that the cross products, the error of the edge values, and on
-//! which side of a triangle the origin lies are found once for all rays, of eight triangles at a time. What is left for
-//! a ray are two operations an edge.
+//! direction, d · (p × q) / d_z for the edge from q to p, so that the cross products, the error of the edge values, and the
+//! side of each triangle on which the origin lies are computed once for all rays, for eight triangles at a time. Only two
+//! operations per edge remain for each ray.
 
 use super::Vec3;
 use super::bounds::{EdgeMargins, FAN_EDGE, HEIGHTS, WEIGHTS};
@@ -11,49 +11,50 @@ use super::sight::{AXES, Rows};
 use super::simd::{Axis, LANES, Lanewise, Row, Simd};
 use super::triangles::{Corners8, Verdicts};
 
-/// Rays side by side that start at one place and run to one octant with the same component the largest; their numbers are
-/// within [`BOX_RANGE`](super::bounds::BOX_RANGE), and hits behind their origin do not count.
+/// Rays side by side from one origin, with one octant and the same main axis; their numbers are within
+/// [`BOX_RANGE`](super::bounds::BOX_RANGE), and hits behind their origin do not count.
 pub struct Fan<S: Lanewise<N>, const N: usize> {
-    /// The axes in sheared order.
+    /// Axes in sheared order.
     axes: [Axis; 3],
-    /// The origin along these.
+    /// Origin along these axes.
     origin: [f32; 3],
-    /// The directions' components along the first two of them over that along the last.
+    /// Components of the directions along the first two axes over that along the last.
     shear: [S::Lanes; 2],
-    /// 1 over that one.
+    /// Reciprocal of the component along the last axis.
     per_length: S::Lanes,
-    /// Its sign.
+    /// Sign of that component.
     forwards: f32,
 }
 
-/// Eight triangles made ready for a fan.
+/// Eight triangles prepared for a fan.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct FanReady {
-    /// By edge: what is multiplied with the shears, and what is added. Edge values of rays that hit are positive.
+    /// By edge: factors of the shears, and summand. Edge values of rays that hit are positive.
     edges: [[Row; 3]; 3],
-    /// What an edge value may be off.
+    /// Bound of the error of an edge value.
     error: Row,
-    /// The corners along the main axis, relative to the origin.
+    /// Corners along the main axis, relative to the origin.
     heights: [Row; 3],
-    /// What the mean of the heights errs by: over the sum of the edge values, and in any case.
+    /// Error of the mean of the heights: the part to be divided by the sum of the edge values, and the constant part.
     moved: Row,
     rounded: Row,
 }
 
 impl FanReady {
-    /// Of no triangles.
+    /// No triangles.
     pub const EMPTY: Self = {
         let none = [0.0; LANES];
         Self { edges: [[none; 3]; 3], error: none, heights: [none; 3], moved: none, rounded: none }
     };
 }
 
-/// The edge values of rays.
+/// Edge values of the rays.
 pub struct FanLook<S: Lanewise<N>, const N: usize>([S::Lanes; 3]);
 
 impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
-    /// Rays from `origin` by axis and lane, whose largest components are along axis `z`, with 1 over these.
+    /// Prepares rays from `origin`, with directions by axis and lane, whose largest components are along axis `z`, and the
+    /// reciprocals of these.
     #[inline(always)]
     pub fn new(s: S, origin: Vec3, dir: &[[f32; N]; 3], z: usize, per_length: &[f32; N]) -> Self {
         let per_length = s.load(per_length);
@@ -67,7 +68,7 @@ impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
         }
     }
 
-    /// A corner relative to the origin.
+    /// Corner relative to the origin.
     #[inline(always)]
     fn relative<T: Simd>(&self, s: T, corner: &[Row; 3]) -> [T::Lanes; 3] {
         let ([x, y, z], [ox, oy, oz]) = (self.axes, self.origin);
@@ -78,7 +79,7 @@ impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
         ]
     }
 
-    /// The edge from one corner to another.
+    /// Edge vector between two corners.
     #[inline(always)]
     fn edge<T: Simd>(&self, s: T, from: &[Row; 3], to: &[Row; 3]) -> [T::Lanes; 3] {
         let [x, y, z] = self.axes;
@@ -89,14 +90,14 @@ impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
         ]
     }
 
-    /// [`Rows::ready`] by a given margin of edge values.
+    /// [`Rows::ready`] with a given margin of edge values.
     #[inline(always)]
     fn ready_within<T: Simd>(&self, s: T, corners: &Corners8, margin: f32) -> FanReady {
         let [pa, pb, pc] = corners;
         let (a, b, c) = (self.relative(s, pa), self.relative(s, pb), self.relative(s, pc));
         let (cb, ac, ba) = (self.edge(s, pc, pb), self.edge(s, pa, pc), self.edge(s, pb, pa));
         let (u, v, w) = (cross(s, c, cb), cross(s, a, ac), cross(s, b, ba));
-        // Six times the volume between the origin and the triangle: its sign says from which side the triangle is seen.
+        // Six times the volume between the origin and the triangle: its sign tells from which side the triangle is seen.
         let volume = s.mul_add(u[0], a[0], s.mul_add(u[1], a[1], s.mul(u[2], a[2])));
 
         let far = s.larger(largest(s, a), s.larger(largest(s, b), largest(s, c)));
@@ -156,7 +157,7 @@ impl<S: Lanewise<N>, const N: usize> Rows<S, N> for Fan<S, N> {
 }
 
 impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
-    /// The rays' values of an edge of the triangle in a lane.
+    /// Values of the rays for an edge of the triangle in a lane.
     #[inline(always)]
     fn value(&self, s: S, [x, y, z]: &[Row; 3], lane: usize) -> S::Lanes {
         let (x, y, z) = (s.splat(x[lane % LANES]), s.splat(y[lane % LANES]), s.splat(z[lane % LANES]));
@@ -170,7 +171,7 @@ fn cross<S: Simd>(s: S, [px, py, pz]: [S::Lanes; 3], [qx, qy, qz]: [S::Lanes; 3]
     [s.mul_sub(py, qz, s.mul(pz, qy)), s.mul_sub(pz, qx, s.mul(px, qz)), s.mul_sub(px, qy, s.mul(py, qx))]
 }
 
-/// The largest component, in size.
+/// Largest absolute component.
 #[inline(always)]
 fn largest<S: Simd>(s: S, [x, y, z]: [S::Lanes; 3]) -> S::Lanes {
     s.larger(x, s.larger(y, z))
@@ -186,8 +187,8 @@ fn stored<S: Simd>(s: S, [x, y, z]: [S::Lanes; 3]) -> [Row; 3] {
     [s.store(x), s.store(y), s.store(z)]
 }
 
-/// More than what underflow adds to six times a volume: nine products, 2⁻¹⁵⁰ each, and of these those in the cross product
-/// times a distance below [`BOX_RANGE`](super::bounds::BOX_RANGE).
+/// Exceeds what underflow adds to six times a volume: nine products, 2⁻¹⁵⁰ each, of which those in the cross product are
+/// multiplied by a distance below [`BOX_RANGE`](super::bounds::BOX_RANGE).
 const VOLUME_UNDERFLOW: f32 = 1.0 / (1u128 << 100) as f32;
 
 #[cfg(test)]
@@ -200,14 +201,14 @@ mod tests {
     use super::super::triangles::{NO_CORNERS, set_corners};
     use super::*;
 
-    /// Rays from one place, and triangles.
+    /// Rays from one origin, and triangles.
     struct Case {
         origin: Vec3,
         dirs: [Vec3; LANES],
         triangles: [Triangle; LANES],
     }
 
-    /// What a fan says of each triangle: the verdicts, and between which distances hits are.
+    /// Result of a fan for each triangle: the verdicts, and bounds of the distances of hits.
     type Said = [(Verdicts, [Row; 2]); LANES];
 
     struct Ask<'a>(&'a Case, f32);
@@ -240,19 +241,19 @@ mod tests {
         }
     }
 
-    /// How the rays see the triangles.
+    /// Configuration of rays and triangles.
     #[derive(Clone, Copy, Debug, PartialEq)]
     enum Kind {
         Ordinary,
-        /// From many sizes away.
+        /// Rays from a distance of this many sizes.
         Far(f32),
         /// The origin lies nearly in the triangles' planes.
         Grazing(f32),
-        /// Aimed at corners and edges.
+        /// Rays aimed at corners and edges.
         Edges,
-        /// Some triangles lie behind the origin, some around it.
+        /// Some triangles are behind the origin, some around it.
         Around,
-        /// With numbers as large, or as small, as may be.
+        /// Numbers scaled to the largest and smallest allowed.
         Scaled(i32),
     }
 
@@ -270,7 +271,7 @@ mod tests {
         Kind::Scaled(-30),
     ];
 
-    /// Rays that run to one octant and are longest along one axis; `None` where they do not.
+    /// Generates rays with one octant and one main axis; `None` if they differ.
     fn case(random: &mut Random, kind: Kind) -> Option<Case> {
         let (middle, along) = (random.cube(), random.direction());
         let (right, back) = (along.any_orthonormal_vector(), if let Kind::Far(sizes) = kind { sizes } else { 4.0 });
@@ -312,7 +313,7 @@ mod tests {
         std::iter::repeat_with(|| case(&mut random, kind)).flatten().take(count).collect()
     }
 
-    /// Verdicts that are certain, and of these the wrong ones, by this margin.
+    /// Numbers of certain hits, certain misses, and wrong ones among these, with a given margin.
     fn judged(kind: Kind, margin: f32, level: Level) -> [usize; 3] {
         let (mut hits, mut misses, mut wrong) = (0, 0, 0);
         for case in cases(kind, 150) {

@@ -1,13 +1,13 @@
-//! Functions as formulas without branches and calls, of which compilers make lanes: the same bits on every instruction set,
-//! in lanes and by themselves.
+//! Functions as formulas without branches and calls, which compilers can vectorise: the same bits on every instruction set,
+//! vectorised or not.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-/// Numbers from here on are whole: what is added to it is rounded to these.
+/// From here on every float is an integer: adding this number rounds to integers.
 pub const WHOLE: f32 = 8_388_608.0;
 
-/// The greatest whole number that is not above `x`, without the library call that x86-64 needs for it before SSE4.1, and without
-/// casts, of which compilers make no lanes.
+/// Largest integer not above `x`, without the library call that x86-64 needs for it before SSE4.1, and without casts, which
+/// compilers do not vectorise.
 #[inline(always)]
 pub fn floor(x: f32) -> f32 {
     let whole = WHOLE.copysign(x);
@@ -16,8 +16,8 @@ pub fn floor(x: f32) -> f32 {
     if x.abs() < WHOLE { below } else { x }
 }
 
-/// [`floor`] of one number by itself: with casts, which take less time there, and a choice that mostly falls as for what is not
-/// negative.
+/// [`floor`] of a single number: with casts, which are faster there, and a branch that is well predicted for non-negative
+/// numbers.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "within ±2²³ both casts are exact")]
 pub fn floor_of_one(x: f32) -> f32 {
@@ -26,34 +26,34 @@ pub fn floor_of_one(x: f32) -> f32 {
     if x.abs() < WHOLE { below } else { x }
 }
 
-/// A whole number within ±2³¹ as such.
+/// Converts an integral `x` within ±2³¹.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "the lowest bits are the number")]
 pub fn integer(x: f32) -> i32 {
-    /// 1.5 · 2⁵²: around it numbers are whole.
+    /// 1.5 · 2⁵²: near it floats are integers.
     const WHOLE: f64 = 6_755_399_441_055_744.0;
     (f64::from(x) + WHOLE).to_bits() as i32
 }
 
-/// A whole number within ±2²² as such: two instructions, of lanes as wide as its own.
+/// Converts an integral `x` within ±2²²: two instructions, with lanes as wide as the float's.
 #[inline(always)]
 pub fn near_integer(x: f32) -> i32 {
-    /// 1.5 · 2²³: around it numbers are whole.
+    /// 1.5 · 2²³: near it floats are integers.
     const WHOLE: f32 = 12_582_912.0;
     (x + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits()).cast_signed()
 }
 
-/// 0 up to `from`, 1 from `to` on, and as smooth as a cubic can be between.
+/// 0 up to `from`, 1 from `to` on, and a smooth cubic in between.
 #[inline(always)]
 pub fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// The angle of the place (`x`, `y`) from the x axis, −π … π, to 5e-7; 0 for the origin.
+/// Angle of the point (`x`, `y`) from the x axis, −π … π, to 5e-7; 0 for the origin.
 #[inline(always)]
 pub fn atan2(y: f32, x: f32) -> f32 {
-    /// Of t in powers of t², the arctangent over t: fitted to 0 ≤ t ≤ 1 for the least error at worst.
+    /// Polynomial in t² for the arctangent of t over t: minimax fit on 0 ≤ t ≤ 1.
     const FIT: [f32; 8] = [
         0.999_999_4,
         -0.333_300_32,
@@ -75,12 +75,12 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     upper.copysign(y)
 }
 
-/// The logarithm of a positive finite `x` that is no subnormal by 2, to 5e-6 between 2⁻⁶⁰ and 2⁶⁰ and
-/// 7e-6 beyond; exact for powers of two. Of 0 it is −127.
+/// Base-2 logarithm of a positive, finite, normal `x`, to 5e-6 between 2⁻⁶⁰ and 2⁶⁰ and 7e-6 beyond; exact for powers of two;
+/// −127 for 0.
 #[inline(always)]
 #[expect(clippy::cast_precision_loss, reason = "an exponent")]
 pub fn log2(x: f32) -> f32 {
-    /// Of m in its powers, (log₂(1 + m) − m) / (m (1 − m)): fitted to 0 ≤ m ≤ 1 for the least error of the logarithm.
+    /// Polynomial in m for (log₂(1 + m) − m) / (m (1 − m)): fitted to 0 ≤ m ≤ 1 for the least error of the logarithm.
     const FIT: [f32; 5] = [0.442_553_73, -0.275_708_32, 0.182_354, -0.096_543, 0.026_128_728];
     let bits = x.to_bits();
     let exponent = (bits >> 23).wrapping_sub(127).cast_signed() as f32;
@@ -89,10 +89,10 @@ pub fn log2(x: f32) -> f32 {
     exponent + (m + m * (1.0 - m) * first.iter().rev().fold(last, |sum, c| sum * m + c))
 }
 
-/// The power of two of `x`, −126 … 127, to 2e-7 of it; exact for whole numbers.
+/// 2 to the power of `x`, −126 … 127, with a relative error of 2e-7; exact for integers.
 #[inline(always)]
 pub fn exp2(x: f32) -> f32 {
-    /// Of f in its powers, (2ᶠ − 1 − f) / (f (f − 1)): fitted to 0 ≤ f ≤ 1 for the least error of the power.
+    /// Polynomial in f for (2ᶠ − 1 − f) / (f (f − 1)): fitted to 0 ≤ f ≤ 1 for the least error of the power.
     const FIT: [f32; 4] = [0.306_848_26, 0.066_688_99, 0.010_870_314, 0.001_879_318_6];
     let whole = floor(x);
     let f = x - whole;
@@ -101,24 +101,24 @@ pub fn exp2(x: f32) -> f32 {
     f32::from_bits((integer(whole) + 127).cast_unsigned() << 23) * part
 }
 
-/// `x` ≥ 0 to the power of `exponent`, 0 … 1, to 5e-6 of it between 2⁻⁶⁰ and 2⁶⁰ and 7e-6 beyond.
+/// `x` ≥ 0 to the power of `exponent`, 0 … 1, with a relative error of 5e-6 between 2⁻⁶⁰ and 2⁶⁰ and 7e-6 beyond.
 #[inline(always)]
 pub fn root(x: f32, exponent: f32) -> f32 {
     let power = exp2((exponent * log2(x)).max(-126.0));
     if x > 0.0 { power } else { 0.0 }
 }
 
-/// `x` ≥ 0 to the power of `exponent`, 1 … 1000, to 5e-6 · `exponent` of it: 2⁻¹²⁶ … 2¹²⁷, and 0 for 0.
+/// `x` ≥ 0 to the power of `exponent`, 1 … 1000, with a relative error of 5e-6 · `exponent`: 2⁻¹²⁶ … 2¹²⁷, and 0 for 0.
 #[inline(always)]
 pub fn power(x: f32, exponent: f32) -> f32 {
     let power = exp2((exponent * log2(x)).clamp(-126.0, 127.0));
     if x > 0.0 { power } else { 0.0 }
 }
 
-/// Sine and cosine of so many full turns, 0 ≤ `turns` ≤ 1, to 2e-7.
+/// Sine and cosine of an angle in full turns, 0 ≤ `turns` ≤ 1, to 2e-7.
 #[inline(always)]
 pub fn sin_cos_of_turns(turns: f32) -> (f32, f32) {
-    /// Of r² in its powers, the sine of r turns over r and its cosine: fitted to −⅛ ≤ r ≤ ⅛ for the least error at worst.
+    /// Polynomials in r² for the sine of r turns over r, and for its cosine: minimax fit on −⅛ ≤ r ≤ ⅛.
     const SINE: [f32; 4] = [6.283_185_5, -41.341_63, 81.588_13, -75.240_07];
     const COSINE: [f32; 5] = [1.0, -19.739_208, 64.939_316, -85.442_856, 59.220_406];
     let quarter = floor(turns * 4.0 + 0.5);
@@ -129,9 +129,9 @@ pub fn sin_cos_of_turns(turns: f32) -> (f32, f32) {
     let (sine, cosine) = (r * sum(&SINE), sum(&COSINE));
     let is_odd = quarter & 1 == 1;
     let (sine, cosine) = if is_odd { (cosine, sine) } else { (sine, cosine) };
-    // The quarter turns decide about the signs: that of the cosine is other in the second and third, …
+    // The quarter turn decides the signs: the cosine is negated in the second and third, …
     let minus_cosine = (quarter + 1) & 2 != 0;
-    // … and that of the sine in the third and fourth.
+    // … and the sine in the third and fourth.
     let minus_sine = quarter & 2 != 0;
     (if minus_sine { -sine } else { sine }, if minus_cosine { -cosine } else { cosine })
 }

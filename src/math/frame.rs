@@ -1,12 +1,12 @@
-//! The centre that coordinates are taken relative to before they are rounded to `f32`.
+//! Centre relative to which coordinates are rounded to `f32`.
 
 use super::DVec3;
 
-/// The centre of the box `lo..hi`, snapped to multiples of a power of two near 1/16 of the longest side.
+/// Centre of the box `lo..hi`, snapped to multiples of a power of two near 1/16 of the longest side.
 ///
-/// Snapping makes the subtraction exact for most coordinates, and gives a model moved by a multiple of that power the
-/// same rounded coordinates as the model in its place. Off the true centre by at most 1/16 of the longest side on each
-/// axis. Zero for an empty or non-finite box.
+/// Snapping makes the subtraction exact for most coordinates, and gives a model moved by a multiple of that power the same
+/// rounded coordinates as the unmoved model. Off the true centre by at most 1/16 of the longest side on each axis. Zero for
+/// an empty or non-finite box.
 pub fn snapped_center(lo: DVec3, hi: DVec3) -> DVec3 {
     let extent = (hi - lo).max_element();
     let middle = lo * 0.5 + hi * 0.5;
@@ -17,7 +17,7 @@ pub fn snapped_center(lo: DVec3, hi: DVec3) -> DVec3 {
         return middle;
     }
     let step = libm::exp2(libm::floor(libm::log2(extent)) - 3.0);
-    // A step too small for the numbers' own spacing would change nothing but could overflow.
+    // A step below the numbers' own spacing would change nothing but could overflow.
     if step == 0.0 || step < middle.abs().max_element() * f64::EPSILON {
         middle
     } else {
@@ -25,15 +25,15 @@ pub fn snapped_center(lo: DVec3, hi: DVec3) -> DVec3 {
     }
 }
 
-/// Points that tell where most of a model lies.
+/// Number of points sampled to find where most of a model lies.
 const SAMPLE: usize = 1 << 10;
 
-/// How many times as large as the room of half of the points a box may be to be centred on its middle: rounding to `f32` moves
-/// points by 2⁻¹⁷ of that room at most then.
+/// Largest ratio of a box to the extent of half of its points for which the box is centred on its own middle: rounding to
+/// `f32` then moves points by at most 2⁻¹⁷ of that extent.
 const FAR: f64 = 256.0;
 
-/// The centre to count points in the box `lo..hi` from: [`snapped_center`] of the box, or of the room that half of the points
-/// take, where others are so far away that rounding would show in these. `points` are some of them ([`spread`]).
+/// Centre for points in the box `lo..hi`: [`snapped_center`] of the box, or of the extent of half of the points if others are
+/// so far away that rounding would show in these. `points` are a sample of them ([`spread`]).
 pub fn center_of_most(lo: DVec3, hi: DVec3, points: impl Iterator<Item = DVec3>) -> DVec3 {
     let extent = |lo: DVec3, hi: DVec3| (hi - lo).max_element();
     match half_of(points) {
@@ -42,8 +42,7 @@ pub fn center_of_most(lo: DVec3, hi: DVec3, points: impl Iterator<Item = DVec3>)
     }
 }
 
-/// The room, from corner to corner, that the middle half of the finite ones of these points takes on each axis; `None` where
-/// there are none.
+/// Extent, from corner to corner, of the middle half of the finite points on each axis; `None` if there are none.
 pub fn half_of(points: impl Iterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {
     let mut sample: Vec<DVec3> = points.filter(|p| p.is_finite()).collect();
     let (quarter, last) = (sample.len() / 4, sample.len().checked_sub(1)?);
@@ -55,12 +54,12 @@ pub fn half_of(points: impl Iterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {
     Some((low, high))
 }
 
-/// Numbers of some of so many points, spread evenly.
+/// Indices of a sample of `count` points, spread evenly.
 pub fn spread(count: usize) -> impl Iterator<Item = usize> {
     (0..count).step_by(stride(count))
 }
 
-/// Of so many points every how many-th is looked at to tell where most of them lie.
+/// Step between sampled points out of `count`.
 pub fn stride(count: usize) -> usize {
     count.div_ceil(SAMPLE).max(1)
 }
@@ -77,7 +76,7 @@ mod tests {
         for strays in [0, 1, 20] {
             assert!((center(strays) - near(50)).length() < 4.0, "{strays}: {}", center(strays));
         }
-        // Where a third lies there it is a part of the model.
+        // If a third of the points lies there, it is a part of the model.
         assert!((center(60) - near(50)).length() > 1e6);
         assert_eq!(center_of_most(-DVec3::ONE, DVec3::ONE, std::iter::empty()), DVec3::ZERO);
         let all: Vec<usize> = spread(5000).collect();

@@ -1,17 +1,17 @@
-//! Starts of secondary rays kept away from the edges of the face they start on.
+//! Keeps the starts of secondary rays away from the edges of their faces.
 //!
-//! A start in `f32` lies beside the exact hit by some roundings, and near an edge it could lie beyond the face that
-//! rises there: inside the solid, where a ray that should be free is stopped at once, or outside a closed room, where a
-//! ray that should be stopped is free. A start that is a few roundings further inside its own face lies on the right side
-//! of every face that meets it at an edge or corner, unless the angle between them is below [`EDGE_ROOM`]'s.
+//! A start in `f32` is off the exact hit by some roundings, and near an edge it could lie beyond the neighbouring face:
+//! inside the solid, where a ray that should be free is blocked at once, or outside a closed room, where a ray that should be
+//! blocked is free. A start that is moved inwards on its own face by a few roundings lies on the right side of every face
+//! that meets it at an edge or corner, unless the angle between them is below that of [`EDGE_ROOM`].
 
 use super::DVec3;
 use super::bounds::EDGE_ROOM;
 use super::triangle::{Triangle, in_f64};
 
-/// How far a hit of weights `u`, `v` of the second and third corner is to be moved along its triangle, so that its
-/// distance from each edge is at least [`EDGE_ROOM`] times `error`, the uncertainty of its position, or as large as a
-/// narrow triangle has room for. Zero but for hits that near an edge.
+/// Displacement along the triangle of a hit with weights `u`, `v` of the second and third corner, so that its distance from
+/// each edge is at least [`EDGE_ROOM`] times `error`, the uncertainty of its position, or as large as a narrow triangle
+/// allows. Zero unless the hit is near an edge.
 #[inline]
 pub fn inset(triangle: &Triangle, (u, v): (f32, f32), error: f32) -> DVec3 {
     let [a, b, c] = in_f64(triangle);
@@ -24,47 +24,47 @@ pub fn inset(triangle: &Triangle, (u, v): (f32, f32), error: f32) -> DVec3 {
     moved_inwards([a, b, c], weights, rim.heights2.map(|height2| room / height2.sqrt()), room)
 }
 
-/// What tells how far a point of a triangle is from its edges.
+/// Data for the distances of a triangle's points from its edges.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Rim {
-    /// The squares of the heights of each corner over the opposite edge; infinite where the triangle has no area.
+    /// Squared heights of each corner over the opposite edge; infinite for a triangle without area.
     pub heights2: [f64; 3],
 }
 
 impl Rim {
-    /// Of a triangle whose normal is (b − a) × (c − a).
+    /// Computes the heights of a triangle whose normal is (b − a) × (c − a).
     #[inline(always)]
     pub fn of([a, b, c]: [DVec3; 3], normal: DVec3) -> Self {
-        // The square of twice the area.
+        // Square of twice the area.
         let area2 = normal.length_squared();
         let over = |edge: DVec3| if area2 == 0.0 { f64::INFINITY } else { area2 / edge.length_squared() };
         Self { heights2: [over(c - b), over(a - c), over(b - a)] }
     }
 
-    /// Whether a hit of weights `u`, `v` whose position is off by `error` is to be moved inwards by [`inset`].
+    /// Whether [`inset`] moves a hit with weights `u`, `v` and position error `error` inwards.
     #[inline(always)]
     pub fn is_near(&self, (u, v): (f32, f32), error: f32) -> bool {
         let (u, v) = (f64::from(u), f64::from(v));
         let weights = [1.0 - u - v, u, v];
         let room = f64::from(error) * EDGE_ROOM;
         // The weight of a corner times its height over the opposite edge is the distance from that edge. (Zero times an
-        // infinite height is no number, and not near.)
+        // infinite height is NaN, and not near.)
         let is_near = |k: usize| weights[k] * weights[k] * self.heights2[k] < room * room;
         is_near(0) | is_near(1) | is_near(2)
     }
 }
 
-/// The way from the place of weights `w` to one where each weight is at least as large as in `least`.
+/// Displacement from the point with weights `w` to one where each weight is at least that in `least`.
 #[cold]
 fn moved_inwards([a, b, c]: [DVec3; 3], w: [f64; 3], least: [f64; 3], room: f64) -> DVec3 {
-    /// A triangle that is too narrow for the room gives what it has: least weights above this would leave no place.
+    /// Limit of `least` for a triangle too narrow for the room: larger weights would leave no point.
     const WIDE: f64 = 0.25;
-    /// At a sharp corner there is room only far from it: a start goes no further than so many times the room.
+    /// Limit of the displacement, in units of the room: at a sharp corner there is room only far from it.
     const FAR: f64 = 16.0;
     let raised: [f64; 3] = std::array::from_fn(|k| w[k].max(least[k].min(WIDE)));
     let largest = (0..3).fold(0, |best, k| if raised[k] > raised[best] { k } else { best });
     let mut change: [f64; 3] = std::array::from_fn(|k| raised[k] - w[k]);
-    // The other two weights are at most one half and what they were raised to, so this one stays the largest.
+    // The other two weights are at most one half and their raised values, so this one stays the largest.
     change[largest] -= raised.iter().sum::<f64>() - 1.0;
     let way = (b - a) * change[1] + (c - a) * change[2];
     let length = way.length();

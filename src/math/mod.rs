@@ -1,7 +1,7 @@
-//! Numbers only: vectors, rays against shapes, error bounds.
+//! Pure numerics: vectors, rays against shapes, error bounds.
 //!
-//! Everything here is pure arithmetic on plain values; no module below this one knows of scenes, files or threads.
-//! Rounding tricks live here and nowhere else.
+//! Everything here is arithmetic on plain values; no module below this one knows of scenes, files or threads. Rounding tricks
+//! live here and nowhere else.
 
 pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat4, Vec2, Vec3, Vec3Swizzles, Vec4};
 

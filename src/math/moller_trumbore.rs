@@ -1,7 +1,8 @@
-//! The comparator: T. Möller, B. Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*, 1997, as published.
+//! Test for comparison: T. Möller, B. Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*, 1997, as published.
 //!
-//! Not watertight: the two triangles at an edge decide about it with different arithmetic, and both may refuse a ray. Its
-//! determinant test depends on scale; here only an exactly zero determinant is refused. No structure uses it by default.
+//! Not watertight: the two triangles at an edge evaluate it with different arithmetic, and both may reject a ray. The
+//! determinant test of the paper depends on scale; here only an exactly zero determinant is rejected. No structure uses this
+//! test by default.
 
 use super::triangle::Triangle;
 use super::{DVec3, Vec3};
@@ -46,7 +47,7 @@ mod tests {
             (Vec3::new(0.25, 0.5, 2.0), Vec3::NEG_Z, Some((2.0, 0.25, 0.5))),
             (Vec3::new(0.25, 0.5, -2.0), Vec3::Z, Some((2.0, 0.25, 0.5))),
             (Vec3::new(0.75, 0.5, 2.0), Vec3::NEG_Z, None),
-            // In the plane's direction.
+            // Parallel to the plane.
             (Vec3::new(0.25, 0.0, 2.0), Vec3::X, None),
         ] {
             assert_eq!(single(o, d, t), expected);

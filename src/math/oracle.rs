@@ -1,4 +1,4 @@
-//! The tests' judge: the same questions answered in rational numbers, without any rounding.
+//! Oracle of the tests: the same queries answered in rational numbers, without any rounding.
 
 use dashu::base::{Abs, SquareRoot, UnsignedAbs};
 use dashu::integer::IBig;
@@ -14,7 +14,7 @@ use super::shear::RaySpace;
 use super::triangle::{self, Triangle};
 use super::{Vec3, plane, quotient, sphere};
 
-/// Where the line meets the triangle, from numbers in `f32`.
+/// Distance at which the line hits the triangle, for `f32` input.
 fn hit(origin: Vec3, dir: Vec3, triangle: &Triangle) -> Option<RBig> {
     rational::hit(&point(origin), &point(dir), triangle)
 }
@@ -32,20 +32,20 @@ fn is_nearest(t: f32, exact_t: &RBig) -> bool {
     (no_nearer(t.next_up()) || zero) && no_nearer(t.next_down())
 }
 
-/// The root of x ≥ 0 to a relative error of 2⁻⁴⁰⁰; exact for the square of a rational number.
+/// Square root of x ≥ 0 with a relative error of 2⁻⁴⁰⁰; exact for the square of a rational number.
 pub(super) fn root(x: &RBig) -> RBig {
     let square = (x.numerator() * IBig::from(x.denominator().clone())) << 800;
     RBig::from_parts(IBig::from(square.unsigned_abs().sqrt()), x.denominator().clone() << 400)
 }
 
-/// How many ulp (`f32`) `t` is from `exact_t`.
+/// Error of `t` against `exact_t`, in ulp (`f32`).
 pub(super) fn ulps(t: f32, exact_t: &RBig) -> f64 {
     let size = exact_t.to_f32().value().abs();
     let ulp = f64::from(size.next_up()) - f64::from(size);
     ((exact(t) - exact_t).abs() / RBig::try_from(ulp).unwrap_or_default()).to_f64().value()
 }
 
-/// Where the line meets a sphere, smaller first.
+/// Distances at which the line hits a sphere, smaller first.
 fn sphere_hits(o: Vec3, d: Vec3, center: Vec3, radius: f32) -> Option<[RBig; 2]> {
     let (d, f, r) = (point(d), minus(&point(center), &point(o)), exact(radius));
     let (a, b, c) = (dot(&d, &d), dot(&d, &f), dot(&f, &f) - &r * &r);
@@ -56,7 +56,7 @@ fn sphere_hits(o: Vec3, d: Vec3, center: Vec3, radius: f32) -> Option<[RBig; 2]>
     })
 }
 
-/// Whether the line passes inside the outline by the crossing rule of `math::polygon`, in sheared rational coordinates.
+/// Whether the line passes inside the outline, by the crossing rule of `math::polygon` in sheared rational coordinates.
 fn passes_inside(ray: &RaySpace, corners: &[Vec3]) -> bool {
     let (o, d) = (point(ray.origin), point(ray.dir));
     let sheared: Vec<[RBig; 2]> = corners
@@ -77,13 +77,13 @@ fn passes_inside(ray: &RaySpace, corners: &[Vec3]) -> bool {
     inside
 }
 
-/// N·(p₀ − o) / N·d with Newell's normal, kept in the box of the corners.
+/// N·(p₀ − o) / N·d with Newell's normal, clamped to the box of the corners.
 fn polygon_hit(o: Vec3, d: Vec3, corners: &[Vec3]) -> Option<RBig> {
     let (o, d, first) = (point(o), point(d), point(corners[0]));
     let mut normal = [RBig::ZERO, RBig::ZERO, RBig::ZERO];
     for (i, &q) in corners.iter().enumerate() {
         let (p, q) = (point(corners[(i + corners.len() - 1) % corners.len()]), point(q));
-        // Newell's own sum, of trapezoids.
+        // Newell's original sum, of trapezoids.
         for (n, (i, j)) in normal.iter_mut().zip([(1, 2), (2, 0), (0, 1)]) {
             *n += (&p[i] - &q[i]) * (&p[j] + &q[j]);
         }
@@ -106,8 +106,8 @@ fn polygon_hit(o: Vec3, d: Vec3, corners: &[Vec3]) -> Option<RBig> {
     (!slope.is_zero()).then(|| (dot(&normal, &minus(&first, &o)) / slope).max(enter).min(leave))
 }
 
-/// Outlines of 3 to 8 corners, most concave or self-intersecting, in one plane or nearly; and rays at their corners,
-/// edges and anywhere.
+/// Outlines of 3 to 8 corners, most of them concave or self-intersecting, in one plane or nearly; and rays at their corners,
+/// edges and random points.
 fn outlined() -> impl Strategy<Value = (Vec3, Vec3, Vec<Vec3>)> {
     let small = || (-3i32..4).prop_map(|x| x as f32);
     let whole = || [small(), small(), small()].prop_map(Vec3::from_array);
@@ -129,7 +129,7 @@ fn outlined() -> impl Strategy<Value = (Vec3, Vec3, Vec<Vec3>)> {
     )
 }
 
-/// Numbers of many sizes, biased to collisions: small integers, their neighbours, and any exponent.
+/// Numbers of many sizes, biased towards collisions: small integers, their neighbours, and any exponent.
 fn coordinate() -> impl Strategy<Value = f32> {
     prop_oneof![
         4 => (-4i32..5).prop_map(|x| x as f32),
@@ -145,7 +145,7 @@ fn vector() -> impl Strategy<Value = Vec3> {
     [coordinate(), coordinate(), coordinate()].prop_map(Vec3::from_array)
 }
 
-/// Rays aimed at corners and edges, from anywhere.
+/// Rays from random origins, aimed at corners and edges.
 fn aimed() -> impl Strategy<Value = (Vec3, Vec3, Triangle)> {
     (vector(), [vector(), vector(), vector()], 0..5usize, 0.0f32..1.0, vector()).prop_map(|(o, t, kind, s, d)| {
         let target = match kind {
@@ -159,7 +159,7 @@ fn aimed() -> impl Strategy<Value = (Vec3, Vec3, Triangle)> {
     })
 }
 
-/// The same cases in every run; with `MESHRAY_LONG=1` a hundred times as many.
+/// The same cases in every run; a hundred times as many with `MESHRAY_LONG=1`.
 fn config() -> ProptestConfig {
     let cases = if std::env::var("MESHRAY_LONG").is_ok_and(|v| v == "1") { 300_000 } else { 3000 };
     let rng_seed = RngSeed::Fixed(3);
@@ -221,7 +221,7 @@ proptest! {
     ) {
         let radius = (r.0 * 2f32.powi(r.1)).max(1e-30);
         let side = turn.cross(c - o).normalize_or(Vec3::Y);
-        // At the middle, past the rim, or anywhere.
+        // At the centre, past the rim, or at random.
         let d = match at { 0 => c - o, 1 => c + side * radius - o, _ => d };
         let Some(ray) = RaySpace::new(o, d) else { return Ok(()) };
         if !(1e-15..1e15).contains(&d.length()) || (c - o).length() > 1e15 {
@@ -256,7 +256,7 @@ proptest! {
     }
 }
 
-/// Points of a grid so small that corners often coincide, with each other and with where the ray starts.
+/// Points of such a coarse grid that corners often coincide, with each other and with the ray's origin.
 #[test]
 fn triangles_without_area_and_rays_from_corners_are_decided_as_rational_numbers_are() {
     let mut random = Random::new(77);
@@ -270,7 +270,7 @@ fn triangles_without_area_and_rays_from_corners_are_decided_as_rational_numbers_
         without_area += usize::from(t[0] == t[1] || t[1] == t[2] || t[2] == t[0]);
         if let (Some(got), Some(expected)) = (got, expected) {
             assert!(is_nearest(got, &expected), "{got} for {}", expected.to_f64().value());
-            // Nothing is a negative distance away that is not behind.
+            // Only hits behind the origin have a negative distance, so zero is positive.
             assert!(!expected.is_zero() || got.to_bits() == 0, "{got}");
             from_corners += usize::from(t.contains(&o));
         }
@@ -294,10 +294,10 @@ fn p9_a_small_sphere_far_away_and_a_large_one_nearby_are_within_2_and_a_half_ulp
     };
     for i in -20..=20 {
         let s = i as f32 / 20.0;
-        // Radius 1e-3 at a distance of 1e5: from the middle to past the rim.
+        // Radius 1e-3 at a distance of 1e5: from the centre to past the rim.
         check(Vec3::new(0.0, 1.1e-3 * s, 3e-4), Vec3::X, Vec3::new(1e5, 0.0, 0.0), 1e-3);
         check(Vec3::ZERO, Vec3::new(6e4, 8e4 + 1e-3 * s, 0.0), Vec3::new(6e4, 8e4, 0.0), 1e-3);
-        // Radius 1e5 seen from 1e-2: straight down, and ever flatter.
+        // Radius 1e5 seen from 1e-2: straight down, and at ever more grazing angles.
         let down = Vec3::new(1.0 - s.abs(), 0.02 * s, -s);
         check(Vec3::ZERO, down, Vec3::new(0.0, 0.0, -1e5 - 0.01), 1e5);
         check(Vec3::Z * 0.01, down, Vec3::new(0.0, 0.0, -1e5), 1e5);

@@ -6,7 +6,7 @@ use super::expansion::Expansion;
 use super::quotient::{Bounded, approximate, rounded};
 use super::shear::RaySpace;
 
-/// The distance at which the line through the ray meets the plane n·p = offset; `None` if it runs along it.
+/// Distance at which the line through the ray meets the plane n·p = offset; `None` if it is parallel to the plane.
 pub fn intersect(ray: &RaySpace, normal: Vec3, offset: f32) -> Option<f32> {
     if let Some(t) = quotient(ray, normal, offset).and_then(Bounded::nearest) {
         return Some(t);
@@ -15,7 +15,7 @@ pub fn intersect(ray: &RaySpace, normal: Vec3, offset: f32) -> Option<f32> {
     (denominator.sign() != 0).then(|| rounded::<8, 200>(&numerator, &denominator))
 }
 
-/// As [`intersect`]'s distance of a plane that is hit, to a relative error of [`POSITION_T`].
+/// Distance of [`intersect`] to a plane that is hit, with a relative error of [`POSITION_T`].
 pub fn distance_f64(ray: &RaySpace, normal: Vec3, offset: f32) -> f64 {
     const { assert!(EXACT_QUOTIENT < POSITION_T) };
     match quotient(ray, normal, offset) {
@@ -27,7 +27,7 @@ pub fn distance_f64(ray: &RaySpace, normal: Vec3, offset: f32) -> f64 {
     }
 }
 
-/// Products of two `f32` are exact in `f64`; the sums add 3 and 2 roundings.
+/// Computes the quotient in `f64`. Products of two `f32` are exact; the sums add 3 and 2 roundings.
 fn quotient(ray: &RaySpace, normal: Vec3, offset: f32) -> Option<Bounded> {
     let (n, o, d) = (normal.as_dvec3(), ray.origin.as_dvec3(), ray.dir.as_dvec3());
     let numerator = f64::from(offset) - n.dot(o);

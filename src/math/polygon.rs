@@ -1,17 +1,17 @@
-//! Ray against a whole planar n-gon, concave and self-intersecting ones included (even–odd).
+//! Ray against a whole planar n-gon, also concave or self-intersecting (even–odd rule).
 //!
 //! # Boundary
-//! The crossing test of E. Haines, *Point in Polygon Strategies*, Graphics Gems IV, 1994, on exact signs in sheared ray
-//! space: the ray is the origin there, and the edges that cross the positive x' axis are counted. A corner on the axis
-//! counts as above it and a crossing at the origin does not count, so that in a mesh of polygons every ray belongs to
-//! exactly one of those that share an edge or corner. Which one follows from the ray alone: the side x' > 0, and y' ≥ 0 at
-//! a corner, where x', y' are the two axes after the direction's largest. So an edge or corner of a single polygon may or
-//! may not be hit, unlike a triangle's, which always is; a corner that is listed twice, a spike (a–b–a) and an edge run
-//! through twice change nothing.
+//! The crossing test of E. Haines, *Point in Polygon Strategies*, Graphics Gems IV, 1994, with exact signs in sheared ray
+//! space: the ray is the origin there, and the edges that cross the positive x' axis are counted. A corner on the axis counts
+//! as above it and a crossing at the origin does not count, so that in a mesh of polygons every ray belongs to exactly one of
+//! those that share an edge or corner. Which one follows from the ray alone: the side x' > 0, and y' ≥ 0 at a corner, where
+//! x', y' are the two axes after the direction's largest. So an edge or corner of a single polygon may or may not be hit,
+//! unlike a triangle's, which always is; a repeated corner, a spike (a–b–a) and an edge traversed twice change nothing.
 //!
 //! # Distance
-//! It is that of the plane through the first corner with Newell's normal, exact and rounded once, like a triangle's. A
-//! polygon whose areas cancel (an even bow-tie) has no normal and is hit only where its plane is parallel to two axes.
+//! The distance is that of the plane through the first corner with Newell's normal, exact and rounded once, like a
+//! triangle's. A polygon whose areas cancel (an even bow-tie) has no normal and is hit only if its plane is parallel to two
+//! axes.
 
 use dashu::rational::RBig;
 
@@ -21,22 +21,22 @@ use super::rational::{cross, dot, minus, point, sign};
 use super::shear::RaySpace;
 use super::{DVec3, Vec3, Vec3Swizzles};
 
-/// The corners of one polygon: a run of indices into an array of vertices.
+/// A polygon as a run of corner indices into an array of vertices.
 #[derive(Clone, Copy, Debug)]
 pub struct Polygon<'a> {
     /// All vertices.
     pub vertices: &'a [Vec3],
-    /// The corners in order; at least 3.
+    /// Corners in order; at least 3.
     pub corners: &'a [u32],
 }
 
 impl<'a> Polygon<'a> {
-    /// The corners' positions.
+    /// Positions of the corners.
     pub fn points(self) -> impl Iterator<Item = Vec3> + Clone + use<'a> {
         self.corners.iter().map(move |&i| self.vertices[i as usize])
     }
 
-    /// Each edge, the closing one first.
+    /// Edges as pairs of points, the closing one first.
     fn edges(self) -> impl Iterator<Item = (Vec3, Vec3)> + use<'a> {
         let n = self.corners.len();
         self.points().cycle().skip(n - 1).zip(self.points())
@@ -47,7 +47,7 @@ impl<'a> Polygon<'a> {
         self.points().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)))
     }
 
-    /// Twice the area vector (M. Newell), in `f64`; towards the side from which the corners run counter-clockwise.
+    /// Twice the area vector (M. Newell), in `f64`; towards the side from which the corners are counter-clockwise.
     pub fn newell(self) -> DVec3 {
         let Some(base) = self.points().next().map(Vec3::as_dvec3) else { return DVec3::ZERO };
         self.edges().map(|(p, q)| (p.as_dvec3() - base).cross(q.as_dvec3() - base)).sum()
@@ -59,10 +59,10 @@ impl<'a> Polygon<'a> {
     }
 }
 
-/// The distance at which the line through the ray meets the polygon; exact, rounded once.
+/// Distance at which the line through the ray meets the polygon; exact, rounded once.
 ///
-/// It is defined as N·(p₀ − o) / N·d, with the first corner p₀ and Newell's normal N of the `f32` corners, moved into the
-/// polygon's box: where the corners are off the plane by rounding, a grazing ray could else hit far beyond them.
+/// Defined as N·(p₀ − o) / N·d, with the first corner p₀ and Newell's normal N of the `f32` corners, clamped to the polygon's
+/// box: where the corners are off the plane by rounding, a grazing ray could otherwise hit far beyond them.
 pub fn intersect(ray: &RaySpace, polygon: Polygon) -> Option<f32> {
     if !is_inside(ray, polygon) {
         return None;
@@ -71,7 +71,7 @@ pub fn intersect(ray: &RaySpace, polygon: Polygon) -> Option<f32> {
     near.or_else(|| exact_distance(ray, polygon).map(|t| never_zero_behind(&t)))
 }
 
-/// As [`intersect`]'s distance of a polygon that is hit, to a relative error of [`POSITION_T`].
+/// Distance of [`intersect`] to a polygon that is hit, with a relative error of [`POSITION_T`].
 pub fn distance_f64(ray: &RaySpace, polygon: Polygon) -> Option<f64> {
     match quotient(ray, polygon) {
         Some(t) if t.is_within(POSITION_T) => Some(t.value),
@@ -85,7 +85,7 @@ fn is_inside(ray: &RaySpace, polygon: Polygon) -> bool {
     for (p, q) in polygon.edges() {
         let (p_above, q_above) = (ray.height_sign(p) >= 0, ray.height_sign(q) >= 0);
         if p_above != q_above {
-            // The edge meets the axis at (x'ₚ y'_q − y'ₚ x'_q) / (y'_q − y'ₚ).
+            // The edge crosses the axis at (x'ₚ y'_q − y'ₚ x'_q) / (y'_q − y'ₚ).
             let upwards = if q_above { 1 } else { -1 };
             inside ^= ray.edge_sign(p, q) * upwards > 0;
         }
@@ -93,13 +93,13 @@ fn is_inside(ray: &RaySpace, polygon: Polygon) -> bool {
     inside
 }
 
-/// The distance in `f64`; `None` where it cannot be told whether the box moves it.
+/// Distance in `f64`; `None` if it is uncertain whether the box changes it.
 fn quotient(ray: &RaySpace, polygon: Polygon) -> Option<Bounded> {
     let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
     let (lo, hi) = polygon.bounds();
     let flat = (0..3).find(|&k| lo[k] == hi[k] && d[k] != 0.0);
     if let Some(k) = flat {
-        // In an axis-parallel plane nothing is left to choose. One rounding of the difference, one of the quotient.
+        // In an axis-parallel plane the box fixes the distance. One rounding of the difference, one of the quotient.
         let value = (f64::from(lo[k]) - o[k]) / d[k];
         return Some(Bounded { value, error: 4.0 * U64 * value.abs() });
     }
@@ -126,12 +126,12 @@ fn quotient(ray: &RaySpace, polygon: Polygon) -> Option<Bounded> {
     (0..3).all(|k| d[k] == 0.0 || inside(k)).then_some(distance)
 }
 
-/// a × b with a sum in place of each difference: bounds the sizes of a cross product's terms.
+/// a × b with sums in place of differences: bounds the sizes of a cross product's terms.
 fn twisted(a: DVec3, b: DVec3) -> DVec3 {
     a.yzx() * b.zxy() + a.zxy() * b.yzx()
 }
 
-/// The distance in rational numbers; `None` for a line along the plane.
+/// Distance in rational numbers; `None` for a line parallel to the plane.
 #[cold]
 fn exact_distance(ray: &RaySpace, polygon: Polygon) -> Option<RBig> {
     let (o, d) = (point(ray.origin), point(ray.dir));
@@ -156,7 +156,7 @@ fn exact_distance(ray: &RaySpace, polygon: Polygon) -> Option<RBig> {
     Some(t)
 }
 
-/// As [`round`](super::quotient::round), of a rational number.
+/// [`round`](super::quotient::round) for a rational number.
 fn never_zero_behind(t: &RBig) -> f32 {
     let rounded = t.to_f32().value();
     if sign(t) < 0 && rounded == 0.0 { -f32::from_bits(1) } else { rounded }

@@ -1,8 +1,8 @@
-//! The primaries of colours, and what turns them into those of Rec. 709.
+//! Primaries of colour spaces, and their conversion to Rec. 709.
 
 use super::{DMat3, DVec3};
 
-/// CIE XYZ, white D65, as linear Rec. 709 (IEC 61966-2-1); a colour out of its gamut has negative parts.
+/// Converts CIE XYZ, white D65, to linear Rec. 709 (IEC 61966-2-1); a colour outside its gamut has negative components.
 pub fn rec_709_of_xyz(xyz: DVec3) -> DVec3 {
     let row = |x: f64, y: f64, z: f64| DVec3::new(x, y, z).dot(xyz);
     DVec3::new(
@@ -12,12 +12,12 @@ pub fn rec_709_of_xyz(xyz: DVec3) -> DVec3 {
     )
 }
 
-/// The colours that a space of three is made of, by their places in the CIE diagram (x, y).
+/// Primaries and white of an RGB colour space, as CIE chromaticities (x, y).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Primaries {
-    /// Red, green, blue.
+    /// Chromaticities of red, green and blue.
     pub colors: [[f64; 2]; 3],
-    /// What 1, 1, 1 looks like.
+    /// Chromaticity of the white point, the colour of 1, 1, 1.
     pub white: [f64; 2],
 }
 
@@ -28,21 +28,22 @@ impl Primaries {
     /// CIE XYZ itself, as OpenEXR writes it.
     pub const CIE_XYZ: Self = Self { colors: [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], white: [1.0 / 3.0, 1.0 / 3.0] };
 
-    /// Those at these places: red, green, blue and white.
+    /// Primaries with these chromaticities: red, green, blue and white.
     pub fn of(places: [[f32; 2]; 4]) -> Self {
         let [red, green, blue, white] = places.map(|place| place.map(f64::from));
         Self { colors: [red, green, blue], white }
     }
 
-    /// Whether these are those of another space, but for rounding to three digits.
+    /// Whether these primaries equal those of another space, up to rounding to three digits.
     pub fn are_near(&self, other: &Self) -> bool {
         const ROUNDING: f64 = 1e-3;
         let pairs = self.colors.iter().zip(&other.colors).chain([(&self.white, &other.white)]);
         pairs.flat_map(|(a, b)| a.iter().zip(b)).all(|(a, b)| (a - b).abs() <= ROUNDING)
     }
 
-    /// What turns colours of this space into linear Rec. 709; white stays white, as eyes adapt to it (K. M. Lam, "Metamerism
-    /// and Colour Constancy", 1985: Bradford's cones), but for XYZ, which is what is seen. `None`: they span no space.
+    /// Matrix that converts colours of this space to linear Rec. 709; white stays white by chromatic adaptation (K. M. Lam,
+    /// "Metamerism and Colour Constancy", 1985: Bradford's cones), except for XYZ, which is not adapted. `None` if the
+    /// primaries span no space.
     pub fn to_rec_709(&self) -> Option<DMat3> {
         if self.are_near(&Self::CIE_XYZ) {
             return Some(Self::REC_709.to_xyz()?.inverse());
@@ -58,9 +59,9 @@ impl Primaries {
         turned.is_finite().then_some(turned)
     }
 
-    /// CIE XYZ of its colours, white being of brightness 1 (SMPTE RP 177, 1993).
+    /// Matrix to CIE XYZ, with a white of luminance 1 (SMPTE RP 177, 1993).
     fn to_xyz(self) -> Option<DMat3> {
-        /// What three colours in a line span, but for rounding.
+        /// Largest determinant of collinear primaries, up to rounding.
         const FLAT: f64 = 1e-6;
         let [red, green, blue] = self.colors.map(|[x, y]| DVec3::new(x, y, 1.0 - x - y));
         let colors = DMat3::from_cols(red, green, blue);
@@ -70,7 +71,7 @@ impl Primaries {
     }
 }
 
-/// CIE XYZ of a white of brightness 1 by its place in the diagram; `None` where it has no brightness.
+/// CIE XYZ of a white of luminance 1 with this chromaticity; `None` if it has no luminance.
 fn xyz_of([x, y]: [f64; 2]) -> Option<DVec3> {
     let xyz = DVec3::new(x / y, 1.0, (1.0 - x - y) / y);
     xyz.is_finite().then_some(xyz)
@@ -89,13 +90,13 @@ mod tests {
             assert!((white - DVec3::ONE).length() < 1e-12, "{white}");
         }
         assert!((Primaries::REC_709.to_rec_709().unwrap() - DMat3::IDENTITY).abs_diff_eq(DMat3::ZERO, 1e-12));
-        // As published for P3: its red is redder than that of Rec. 709.
+        // As published for P3: its red is more saturated than that of Rec. 709.
         let red = p3.to_rec_709().unwrap() * DVec3::X;
         assert!((red - DVec3::new(1.2249, -0.0420, -0.0196)).length() < 2e-4, "{red}");
-        // And for the archive space of ACES (S-2008-001), adapted likewise.
+        // And for the archive space of ACES (S-2008-001), adapted in the same way.
         let red = ap0.to_rec_709().unwrap() * DVec3::X;
         assert!((red - DVec3::new(2.5217, -0.2765, -0.0154)).length() < 5e-4, "{red}");
-        // XYZ is turned as it is, and so is what lies below the diagram.
+        // XYZ is not adapted. Collinear primaries and a white without luminance are refused.
         assert!(
             (Primaries::CIE_XYZ.to_rec_709().unwrap() * DVec3::new(0.9505, 1.0, 1.089) - DVec3::ONE).length() < 1e-3
         );

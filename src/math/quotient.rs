@@ -1,30 +1,30 @@
 //! Quotients rounded to the nearest `f32`, and the filter that makes exactness cheap.
 //!
-//! A distance t = numerator/denominator of a planar prim is *defined* as the exact quotient, rounded once. So it is a
+//! A distance t = numerator/denominator of a planar prim is *defined* as the exact quotient, rounded once. It is thus a
 //! function of ray and prim alone: no structure, kernel or order of corners can change a bit of it.
 
 use super::bounds::EXACT_QUOTIENT;
 use super::expansion::Expansion;
 
-/// A computed number and a bound of its absolute error.
+/// A computed number with a bound of its absolute error.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounded {
-    /// What was computed.
+    /// Computed value.
     pub value: f64,
-    /// |value − exact| is at most this.
+    /// Bound of |value − exact|.
     pub error: f64,
 }
 
 impl Bounded {
-    /// The quotient, or `None` where the sign of either term is not certain. Neither the reciprocal of the denominator nor
-    /// its product with the numerator may over- or underflow, which those of terms made of `f32` coordinates do not.
+    /// Quotient, or `None` if the sign of either term is uncertain. Neither the reciprocal of the denominator nor its product
+    /// with the numerator may over- or underflow, which those of terms made of `f32` coordinates do not.
     #[inline(always)]
     pub fn over(self, denominator: Self) -> Option<Self> {
         let (n, d) = (self.value.abs(), denominator.value.abs());
         // Also false for NaN.
         if denominator.error < 0.25 * d && self.error < 0.25 * n {
-            // |(n + e)/(d + f) − n/d| = |e − f n/d| / |d + f|, and |d + f| ≥ 3/4 |d|; 3/2 is for that and for the roundings
-            // here. The reciprocal and the product of the quotient itself are one rounding each.
+            // |(n + e)/(d + f) − n/d| = |e − f n/d| / |d + f|, and |d + f| ≥ 3/4 |d|; 3/2 covers that and the roundings here.
+            // The reciprocal and the product of the quotient itself are one rounding each.
             let reciprocal = 1.0 / denominator.value;
             let value = self.value * reciprocal;
             let size = value.abs();
@@ -36,13 +36,13 @@ impl Bounded {
         }
     }
 
-    /// Whether the error is below this part of the value.
+    /// Whether the error is below the given fraction of the value.
     #[inline]
     pub fn is_within(self, relative: f64) -> bool {
         self.error < self.value.abs() * relative
     }
 
-    /// The `f32` nearest to every number that this may be, or `None` if there is more than one.
+    /// The `f32` nearest to every possible exact value, or `None` if there are several.
     #[inline]
     pub fn nearest(self) -> Option<f32> {
         let spread = self.error * 1.001;
@@ -51,7 +51,7 @@ impl Bounded {
     }
 }
 
-/// `numerator` / `denominator` to a relative error of [`EXACT_QUOTIENT`].
+/// `numerator` / `denominator` with a relative error of [`EXACT_QUOTIENT`].
 pub fn approximate<const N: usize>(numerator: &Expansion<N>, denominator: &Expansion<96>) -> f64 {
     numerator.approximate() / denominator.approximate()
 }
@@ -89,14 +89,14 @@ fn rounded_within<const N: usize, const M: usize>(
     }
 }
 
-/// Nearest `f32`, ties to even; but a negative number never becomes zero, so that what lies behind a ray stays there.
+/// Rounds to the nearest `f32`, ties to even; but a negative number never becomes zero, so that hits behind a ray stay there.
 #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
 pub fn round(t: f64) -> f32 {
     let r = t as f32;
     if t < 0.0 && r == 0.0 { -f32::from_bits(1) } else { r }
 }
 
-/// The midpoint of two neighbouring floats; beyond the largest float stands 2¹²⁸.
+/// Midpoint of two neighbouring floats; 2¹²⁸ stands for the successor of the largest float.
 fn middle(lo: f32, hi: f32) -> f64 {
     let widen = |x: f32| {
         if x.is_infinite() { f64::from(x.signum()) * 2.0 * (1u128 << 127) as f64 } else { f64::from(x) }
@@ -108,7 +108,7 @@ fn middle(lo: f32, hi: f32) -> f64 {
 mod tests {
     use super::*;
 
-    /// 3 (1 + 2⁻²⁴) + 2⁻⁸⁰ over 3: just above the middle between 1 and the next float.
+    /// 3 (1 + 2⁻²⁴) + 2⁻⁸⁰ over 3: just above the midpoint between 1 and the next float.
     fn above_the_middle(doubt: f64) -> f32 {
         let (mut numerator, mut denominator) = (Expansion::<8>::ZERO, Expansion::<96>::ZERO);
         numerator.add(3.0 * (1.0 + f64::from(f32::EPSILON) / 2.0));

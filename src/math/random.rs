@@ -1,18 +1,18 @@
-//! Numbers that look random and are the same in every run.
+//! Pseudorandom numbers, identical in every run.
 
 use super::Vec3;
 
-/// G. Steele, D. Lea, C. Flood, *Fast Splittable Pseudorandom Number Generators* (SplitMix), 2014.
+/// Generator by G. Steele, D. Lea, C. Flood, *Fast Splittable Pseudorandom Number Generators* (SplitMix), 2014.
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 
 impl Random {
-    /// A stream; other seeds give other streams.
+    /// Creates a stream; different seeds give different streams.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// 64 bits.
+    /// Next 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -21,24 +21,24 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// 0 ≤ x < 1, a multiple of 2⁻²⁴.
+    /// Uniform 0 ≤ x < 1, a multiple of 2⁻²⁴.
     #[expect(clippy::cast_precision_loss, reason = "24 bits fit")]
     pub fn unit(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / (1u32 << 24) as f32
     }
 
-    /// 0 ≤ i < n; 0 for n = 0.
+    /// Uniform 0 ≤ i < n; 0 for n = 0.
     #[expect(clippy::cast_possible_truncation, reason = "less than n")]
     pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % n.max(1) as u64) as usize
     }
 
-    /// In the cube −1..1.
+    /// Uniform point in the cube −1..1.
     pub fn cube(&mut self) -> Vec3 {
         Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
     }
 
-    /// A unit vector, every direction alike.
+    /// Uniformly distributed unit vector.
     pub fn direction(&mut self) -> Vec3 {
         loop {
             let v = self.cube();

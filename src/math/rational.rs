@@ -1,7 +1,7 @@
-//! Ray against triangle in rational numbers, without any rounding: the judge of every other test.
+//! Ray against triangle in rational numbers, without any rounding: the reference of every other test.
 //!
-//! It shares nothing with the tests it judges but the definition of a hit: the line meets the closed triangle in one
-//! point; lines in its plane and triangles without area are no hits.
+//! Shares only the definition of a hit with the tests it judges: the line meets the closed triangle in one point; lines in
+//! its plane and triangles without area are not hits.
 
 use dashu::base::Sign;
 use dashu::rational::RBig;
@@ -45,7 +45,7 @@ pub fn along(origin: &Exact3, dir: &Exact3, t: &RBig) -> Exact3 {
     [0, 1, 2].map(|k| &origin[k] + &dir[k] * t)
 }
 
-/// The place of a triangle's plane that is nearest to a point; `None` where the triangle has no area.
+/// Point of a triangle's plane nearest to `p`; `None` if the triangle has no area.
 pub fn foot(p: &Exact3, triangle: &Triangle) -> Option<Exact3> {
     let [a, b, c] = triangle.map(point);
     let normal = cross(&minus(&b, &a), &minus(&c, &a));
@@ -53,7 +53,7 @@ pub fn foot(p: &Exact3, triangle: &Triangle) -> Option<Exact3> {
     (!square.is_zero()).then(|| along(p, &normal, &(dot(&normal, &minus(&a, p)) / square)))
 }
 
-/// −1, 0 or 1.
+/// Sign: −1, 0 or 1.
 pub fn sign(x: &RBig) -> i32 {
     match (x.is_zero(), x.sign()) {
         (true, _) => 0,
@@ -62,7 +62,7 @@ pub fn sign(x: &RBig) -> i32 {
     }
 }
 
-/// Where the line meets the triangle, boundary included; `None` also for lines in its plane.
+/// Distance at which the line hits the triangle, boundary included; `None` also for lines in its plane.
 pub fn hit(o: &Exact3, d: &Exact3, triangle: &Triangle) -> Option<RBig> {
     let [a, b, c] = triangle.map(|p| minus(&point(p), o));
     let signs = [(&b, &c), (&c, &a), (&a, &b)].map(|(p, q)| sign(&dot(d, &cross(p, q))));

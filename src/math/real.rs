@@ -1,4 +1,4 @@
-//! One formula in two precisions: [`f64`] first, and [`Double`], twice as long, where `f64` cannot tell.
+//! One formula in two precisions: [`f64`] first, and [`Double`], twice as long, where `f64` cannot decide.
 //!
 //! A [`Double`] is the unevaluated sum of two `f64`. Algorithms and bounds after M. Joldeş, J.-M. Muller, V. Popescu,
 //! *Tight and Rigorous Error Bounds for Basic Building Blocks of Double-Word Arithmetic*, 2017.
@@ -7,20 +7,20 @@ use super::expansion::{two_product, two_sum};
 use super::{DVec3, Vec3};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A number with a known relative error of every operation.
+/// A real number type with a known relative error of every operation.
 pub trait Real:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
     /// Bound of the relative error of a sum, difference or product; quotient and root err by at most twice that.
     const UNIT: f64;
 
-    /// A number as one of this kind.
+    /// Converts an `f64`.
     fn of(x: f64) -> Self;
 
-    /// The nearest `f64`.
+    /// Nearest `f64`.
     fn value(self) -> f64;
 
-    /// The square root of a number that is not negative.
+    /// Square root of a non-negative number.
     fn sqrt(self) -> Self;
 }
 
@@ -40,14 +40,14 @@ impl Real for f64 {
     }
 }
 
-/// hi + lo, where hi is the nearest `f64` to the sum.
+/// Double-length number hi + lo, where hi is the nearest `f64` to the sum.
 #[derive(Clone, Copy, Debug)]
 pub struct Double {
     hi: f64,
     lo: f64,
 }
 
-/// As `two_sum` for |a| ≥ |b|.
+/// `two_sum` for |a| ≥ |b|.
 fn fast_two_sum(a: f64, b: f64) -> Double {
     let hi = a + b;
     Double { hi, lo: b - (hi - a) }
@@ -124,12 +124,12 @@ impl Div for Double {
     }
 }
 
-/// Three numbers.
+/// Vector of three numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct Real3<R>(pub [R; 3]);
 
 impl<R: Real> Real3<R> {
-    /// A point in numbers of this kind.
+    /// Converts a point in `f64`.
     pub fn of(p: DVec3) -> Self {
         Self(p.to_array().map(R::of))
     }
@@ -139,7 +139,7 @@ impl<R: Real> Real3<R> {
         Self([0, 1, 2].map(|k| R::of(f64::from(p[k])) - R::of(f64::from(q[k]))))
     }
 
-    /// Times a number.
+    /// Product with a number.
     pub fn times(self, factor: R) -> Self {
         Self(self.0.map(|x| x * factor))
     }
@@ -164,7 +164,7 @@ impl<R: Real> Real3<R> {
         Self([(1, 2), (2, 0), (0, 1)].map(|(i, j)| self.0[i] * b.0[j] - self.0[j] * b.0[i]))
     }
 
-    /// The nearest point in `f64`.
+    /// Nearest point in `f64`.
     pub fn value(self) -> DVec3 {
         DVec3::from_array(self.0.map(R::value))
     }
@@ -205,7 +205,7 @@ mod tests {
                 prop_assert!(close(a / b, &(sum(a) / sum(b)), 2));
             }
             let a = if a.hi < 0.0 { -a } else { a };
-            // A relative error of e in the root is one of 2 e in its square.
+            // A relative error of e in the root is 2 e in its square.
             let root = sum(a.sqrt());
             prop_assert!((&root * &root - sum(a)).abs() <= sum(a) * exact(Double::UNIT) * RBig::from(2));
         }

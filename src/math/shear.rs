@@ -1,52 +1,52 @@
-//! Sheared ray space: the ray becomes the third axis, and what it hits is decided in the plane of the other two.
+//! Sheared ray space: the ray becomes the third axis, and hits are decided in the plane of the other two.
 //!
 //! After S. Woop, C. Benthin, I. Wald, *Watertight Ray/Triangle Intersection*, 2013. Corners shared by prims get the same
-//! sheared coordinates, so a mesh becomes one planar drawing without gaps. What differs: the sign of every edge value is
-//! exact for the `f32` ray and corners, so that it does not depend on how it was computed.
+//! sheared coordinates, so a mesh becomes one planar drawing without gaps. The difference: the sign of every edge value is
+//! exact for the `f32` ray and corners, so that it does not depend on the way of computing it.
 
 use super::bounds::{EDGE_ROUNDING_F64, HEIGHT_F64, edge_error_f64};
 use super::expansion::{Expansion, cross, difference, dot_f32};
 use super::{DVec3, Vec3};
 
-/// What the tests of one ray share. Nothing is fused and nothing depends on the prims.
+/// Data shared by the tests of one ray. No operation is fused and nothing depends on the prims.
 #[derive(Clone, Copy, Debug)]
 pub struct RaySpace {
-    /// The ray's origin.
+    /// Origin of the ray.
     pub origin: Vec3,
-    /// The ray's direction, of any length.
+    /// Direction of the ray, of any length.
     pub dir: Vec3,
     /// Axis of the direction's largest component.
     pub z: usize,
-    /// The next axis.
+    /// Axis after `z`, cyclically.
     pub x: usize,
-    /// The axis after that.
+    /// Axis after `x`, cyclically.
     pub y: usize,
     /// dir.x / dir.z in these axes, in `f32`; at most 1 in size.
     pub shear: (f32, f32),
 }
 
-/// The axis after each; the last is none.
+/// The axis after each, cyclically; the last entry is unused.
 const NEXT: [usize; 4] = [1, 2, 0, 0];
 
-/// The axis of a direction's largest component; of equal ones the first.
+/// Axis of a direction's largest component; the first of equal ones.
 #[inline(always)]
 pub fn main_axis(dir: Vec3) -> usize {
     let (x, y, z) = (dir.x.abs(), dir.y.abs(), dir.z.abs());
-    // Without branches: nobody can foretell the axes of rays that run apart.
+    // Without branches, which diverging rays would make unpredictable.
     let either = usize::from(y > x);
     let most = if y > x { y } else { x };
     either + (2 - either) * usize::from(z > most)
 }
 
 impl RaySpace {
-    /// `None` for a ray that cannot hit: zero direction, or anything not finite.
+    /// Ray space of a ray; `None` if it cannot hit: zero direction, or anything not finite.
     #[inline]
     pub fn new(origin: Vec3, dir: Vec3) -> Option<Self> {
         let (space, usable) = Self::checked(origin, dir);
         usable.then_some(space)
     }
 
-    /// The space of a ray, and whether it can hit.
+    /// Ray space of a ray, and whether it can hit.
     #[inline(always)]
     pub fn checked(origin: Vec3, dir: Vec3) -> (Self, bool) {
         let z = main_axis(dir);
@@ -57,7 +57,7 @@ impl RaySpace {
         (Self { origin, dir, z, x, y, shear: (d_x / d_z, d_y / d_z) }, usable)
     }
 
-    /// A corner relative to the origin, axes in sheared order but not yet sheared, in `f64`.
+    /// Corner relative to the origin, with axes in sheared order but not yet sheared, in `f64`.
     fn relative(&self, p: Vec3) -> DVec3 {
         DVec3::new(
             f64::from(p[self.x]) - f64::from(self.origin[self.x]),
@@ -66,19 +66,19 @@ impl RaySpace {
         )
     }
 
-    /// The shear of a relative corner, in `f64`.
+    /// Shears a relative corner, in `f64`.
     fn shear64(&self, a: DVec3) -> (f64, f64) {
         let z = f64::from(self.dir[self.z]);
         (a.x - f64::from(self.dir[self.x]) / z * a.z, a.y - f64::from(self.dir[self.y]) / z * a.z)
     }
 
-    /// The exact sign of x'ₚ y'_q − y'ₚ x'_q: on which side of the ray the edge from `p` to `q` passes.
+    /// Exact sign of x'ₚ y'_q − y'ₚ x'_q: the side of the ray on which the edge from `p` to `q` passes.
     #[inline]
     pub fn edge_sign(&self, p: Vec3, q: Vec3) -> i32 {
         self.edge_sign_within(p, q, EDGE_ROUNDING_F64)
     }
 
-    /// [`Self::edge_sign`], in `f64` where that is certain for this unit roundoff.
+    /// [`Self::edge_sign`], in `f64` where that is certain for the given unit roundoff.
     #[inline]
     fn edge_sign_within(&self, p: Vec3, q: Vec3, rounding: f64) -> i32 {
         let (a, b) = (self.relative(p), self.relative(q));
@@ -95,7 +95,7 @@ impl RaySpace {
     /// x'ₚ y'_q − y'ₚ x'_q = d · (p × q) / d_z with p, q relative to the origin.
     #[cold]
     fn edge_sign_exact(&self, p: Vec3, q: Vec3) -> i32 {
-        // Where rounding made an edge a point, or the ray starts at its end, as at a corner where many meet.
+        // Rounding made the edge a point, or the ray starts at its end, as at a corner where many edges meet.
         if p == q || p == self.origin || q == self.origin {
             return 0;
         }
@@ -104,13 +104,13 @@ impl RaySpace {
         dot_f32(&normal, self.dir.to_array()).sign() * self.direction_sign()
     }
 
-    /// The exact sign of y' of a corner.
+    /// Exact sign of y' of a corner.
     #[inline]
     pub fn height_sign(&self, p: Vec3) -> i32 {
         self.height_sign_within(p, HEIGHT_F64)
     }
 
-    /// [`Self::height_sign`], in `f64` where that is certain for this relative error.
+    /// [`Self::height_sign`], in `f64` where that is certain for the given relative error.
     #[inline]
     fn height_sign_within(&self, p: Vec3, error: f64) -> i32 {
         let a = self.relative(p);
@@ -140,8 +140,8 @@ mod tests {
     use super::super::random::Random;
     use super::*;
 
-    /// Signs of edges and heights that are wrong when `f64` is believed beyond these errors; the rays pass exactly through
-    /// the corners.
+    /// Numbers of wrong signs of edges and heights when `f64` is trusted with these error bounds; the rays pass exactly
+    /// through the corners.
     fn wrong(rounding: f64, height: f64) -> [usize; 2] {
         let mut random = Random::new(8);
         let mut point = || (random.cube() * 50.0).round() * 0.1;

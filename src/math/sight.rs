@@ -1,7 +1,7 @@
-//! What rays see of triangles: exact verdicts where a filter in lanes is certain, and between which distances they are met.
+//! Visibility of triangles to rays: exact verdicts where a filter in lanes is certain, and bounds of the distances of hits.
 //!
-//! As in [`triangles`](super::triangles), but operations are fused where the processor can, and the bounds are those of each
-//! triangle's own distance: an interval that holds the exact distance tells most hits from each other.
+//! As in [`triangles`](super::triangles), but with fused operations where the processor has them, and with bounds for each
+//! triangle's own distance: intervals that contain the exact distances are enough to order most hits.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -9,30 +9,30 @@ use super::bounds::{EdgeMargins, HEIGHTS, WEIGHTS};
 use super::simd::{Axis, LANES, Lanewise, Row, Simd};
 use super::triangles::{Corners8, Verdicts};
 
-/// A ray as blocks see it that are asked about distances, too: its numbers are within
+/// A ray prepared for tests of blocks that also yield distances: its numbers are within
 /// [`BOX_RANGE`](super::bounds::BOX_RANGE).
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Sight {
     /// Origin along the axes in sheared order.
     pub origin: [f32; 3],
-    /// 1 over the direction's component along the last of these axes.
+    /// Reciprocal of the direction's component along the last of these axes.
     pub per_length: f32,
-    /// The direction's components along the first two of these axes over that along the last.
+    /// Components of the direction along the first two of these axes over that along the last.
     pub shear: [f32; 2],
-    /// The axis of the direction's largest component.
+    /// Axis of the direction's largest component.
     pub main: u32,
 }
 
-/// The axes in sheared order, by the ray's main axis; the last is room, so that two bits of a number find an entry.
+/// Axes in sheared order, by the ray's main axis; the last entry is padding, so that any two bits index an entry.
 pub(super) static AXES: [[Axis; 3]; 4] = {
     let [x, y, z] = [Axis::new(0), Axis::new(1), Axis::new(2)];
     [[y, z, x], [z, x, y], [x, y, z], [x, y, z]]
 };
 
-/// What a ray sees of eight triangles.
+/// Result of testing a ray against eight triangles.
 pub struct Look<S: Simd> {
-    /// Which of them it hits.
+    /// Triangles that the ray hits.
     pub verdicts: Verdicts,
     view: View<S, LANES>,
 }
@@ -55,50 +55,49 @@ impl Sight {
 }
 
 impl<S: Simd> Look<S> {
-    /// Between which distances the exact ones lie, of the triangles that are hit for certain.
+    /// Bounds of the exact distances of the triangles that are hit for certain.
     ///
-    /// The exact distance is the mean of the corners' heights with the exact edge values for weights, all of one sign, over
-    /// the direction's component. Edge values that err by e move the mean by 3 e times the spread of the heights over their
-    /// sum S: half of the spread times the sum of the changes of the weights, 6 e/S. The roundings of heights, products,
-    /// sums, the reciprocal and the last products are 10 u of the largest height; 16 u is for what they leave out.
+    /// The exact distance is the mean of the corners' heights, weighted by the exact edge values, all of one sign, over the
+    /// direction's component. Edge values that err by e move the mean by 3 e times the spread of the heights over their sum
+    /// S: half of the spread times the sum of the changes of the weights, 6 e/S. The roundings of heights, products, sums,
+    /// the reciprocal and the last products are 10 u of the largest height; 16 u covers what they leave out.
     #[inline(always)]
     pub fn distances(&self, s: S, sight: &Sight) -> [S::Lanes; 2] {
         self.view.distances(s, s.splat(sight.per_length), [WEIGHTS, HEIGHTS])
     }
 }
 
-/// Rays side by side, with the same axis first, as triangles see them one after another; their numbers are within
+/// Rays side by side with the same main axis, prepared for tests against one triangle at a time; their numbers are within
 /// [`BOX_RANGE`](super::bounds::BOX_RANGE).
 pub struct RowSight<S: Lanewise<N>, const N: usize> {
-    /// The axis of their largest component.
+    /// Main axis of the rays.
     main: usize,
     /// Origins along the axes in sheared order.
     origin: [S::Lanes; 3],
     shear: [S::Lanes; 2],
-    /// 1 over the directions' components along the last of the axes.
+    /// Reciprocals of the directions' components along the last of the axes.
     per_length: S::Lanes,
 }
 
-/// Rays side by side, and how they see triangles: eight are made ready at once, and one after another is looked at.
+/// Rays side by side that prepare eight triangles at once, and test one after another.
 pub trait Rows<S: Lanewise<N>, const N: usize> {
-    /// Eight triangles made ready.
+    /// Eight prepared triangles.
     type Ready;
-    /// What the rays see of one.
+    /// Result of testing the rays against one triangle.
     type Look;
 
-    /// Makes eight triangles ready.
+    /// Prepares eight triangles.
     fn ready<T: Simd>(&self, s: T, corners: &Corners8) -> Self::Ready;
 
-    /// Tests one of eight triangles that were made ready: a bit for each ray. One that is hit behind the origin may be called
-    /// a miss.
+    /// Tests one of eight prepared triangles, with a bit per ray. A hit behind the origin may be reported as a miss.
     fn look(&self, s: S, ready: &Self::Ready, lane: usize) -> (Verdicts, Self::Look);
 
-    /// Between which distances the exact ones lie, of rays that hit for certain.
+    /// Bounds of the exact distances of the rays that hit for certain.
     fn distances(&self, s: S, ready: &Self::Ready, lane: usize, look: &Self::Look) -> [S::Lanes; 2];
 }
 
 impl<S: Lanewise<N>, const N: usize> RowSight<S, N> {
-    /// Rays by axis and lane, whose largest components are along axis `z`, with 1 over these.
+    /// Prepares rays, by axis and lane, whose largest components are along axis `z`, with the reciprocals of these.
     #[inline(always)]
     pub fn new(s: S, origin: &[[f32; N]; 3], dir: &[[f32; N]; 3], z: usize, per_length: &[f32; N]) -> Self {
         let axes = [(z + 1) % 3, (z + 2) % 3, z % 3];
@@ -111,7 +110,7 @@ impl<S: Lanewise<N>, const N: usize> RowSight<S, N> {
         }
     }
 
-    /// A corner of the triangle in a lane relative to the origins.
+    /// Corner of the triangle in a lane, relative to the origins.
     #[inline(always)]
     fn relative(&self, s: S, [x, y, z]: &[Row; 3], lane: usize) -> [S::Lanes; 3] {
         let [x, y, z] = [s.splat(x[lane % LANES]), s.splat(y[lane % LANES]), s.splat(z[lane % LANES])];
@@ -128,7 +127,7 @@ impl<S: Lanewise<N>, const N: usize> Rows<S, N> for RowSight<S, N> {
     type Ready = Corners8;
     type Look = View<S, N>;
 
-    /// Along the axes in sheared order.
+    /// Puts the coordinates into sheared order.
     #[inline(always)]
     fn ready<T: Simd>(&self, s: T, corners: &Corners8) -> Corners8 {
         let axes = AXES[self.main % 4];
@@ -154,9 +153,9 @@ impl<S: Lanewise<N>, const N: usize> Rows<S, N> for RowSight<S, N> {
     }
 }
 
-/// What verdicts leave behind: enough to tell about distances.
+/// Intermediate results of a verdict, from which distances are computed.
 pub struct View<S: Lanewise<N>, const N: usize> {
-    /// Edge values, and what they may be off.
+    /// Edge values, and the bound of their error.
     edges: [S::Lanes; 3],
     error: S::Lanes,
     /// Corners along the ray's main axis, relative to its origin, and the largest of their sizes.
@@ -164,7 +163,7 @@ pub struct View<S: Lanewise<N>, const N: usize> {
     height: S::Lanes,
 }
 
-/// Sheared corners and their heights against the rays.
+/// Tests sheared corners and their heights against the rays.
 #[inline(always)]
 fn view<S: Lanewise<N>, const N: usize>(
     s: S,
@@ -178,8 +177,8 @@ fn view<S: Lanewise<N>, const N: usize>(
     let spread = s.larger(s.larger(ax, ay), s.larger(s.larger(bx, by), s.larger(cx, cy)));
     let height = s.larger(heights[0], s.larger(heights[1], heights[2]));
     let error = EdgeMargins::WITH_DISTANCES.error_by_height(s, height, spread);
-    // Below zero where all edge values have one sign, as far as the nearest of them is from zero.
-    // One of both is below zero at most.
+    // Negative if all edge values have one sign, by the distance of the smallest from zero. At most one of the two operands
+    // is negative.
     let zero = s.splat(-0.0);
     let (low, high) = (s.smaller(u, s.smaller(v, w)), s.greater(u, s.greater(v, w)));
     let apart = s.sooner(s.sub(zero, low), high);
@@ -189,7 +188,7 @@ fn view<S: Lanewise<N>, const N: usize>(
 }
 
 impl<S: Lanewise<N>, const N: usize> View<S, N> {
-    /// [`Look::distances`] by given margins of weights and heights.
+    /// [`Look::distances`] with given margins of weights and heights.
     #[inline(always)]
     fn distances(&self, s: S, per_length: S::Lanes, [weights, heights]: [f32; 2]) -> [S::Lanes; 2] {
         let ([u, v, w], [a, b, c]) = (self.edges, self.heights);
@@ -197,7 +196,7 @@ impl<S: Lanewise<N>, const N: usize> View<S, N> {
         let spread = s.sub(s.greater(a, s.greater(b, c)), s.smaller(a, s.smaller(b, c)));
         let t = s.mul(s.mul_add(u, a, s.mul_add(v, b, s.mul(w, c))), whole);
         let moved = s.mul(s.mul(spread, self.error), s.splat(weights));
-        // What underflow adds is far below the second.
+        // What underflow adds is far below the second term.
         let rounded = s.mul_add(self.height, s.splat(heights), s.splat(EdgeMargins::WITH_DISTANCES.underflow));
         let error = s.mul_add(moved, s.abs(whole), s.mul(rounded, s.abs(per_length)));
         [s.sub(t, error), s.add(t, error)]
@@ -225,7 +224,7 @@ mod tests {
         }
     }
 
-    /// Verdicts, and between which distances those that are hit are, by these margins of weights and heights.
+    /// Kernel for the verdicts and the bounds of distances, with given margins of weights and heights.
     struct Looked<'a>(&'a Sight, &'a Corners8, [f32; 2]);
 
     impl Kernel for Looked<'_> {
@@ -240,17 +239,17 @@ mod tests {
         }
     }
 
-    /// How a ray sees the triangles that it is aimed at.
+    /// Configuration of a ray and the triangles that it is aimed at.
     #[derive(Clone, Copy, Debug)]
     enum Kind {
         Ordinary,
-        /// From many sizes away.
+        /// The ray starts this many sizes away.
         Far(f32),
-        /// Nearly edge on.
+        /// The triangles are nearly edge-on.
         Grazing(f32),
-        /// Large triangles and small ones, from next to them.
+        /// Large and small triangles, from next to them.
         Near,
-        /// With numbers as large, or as small, as may be.
+        /// Numbers scaled to the largest and smallest allowed.
         Scaled(i32),
     }
 
@@ -267,7 +266,7 @@ mod tests {
         Kind::Scaled(-30),
     ];
 
-    /// Eight triangles around a ray, each of its own size.
+    /// Generates eight triangles around a ray, each of its own size.
     fn seen(random: &mut Random, kind: Kind) -> Option<(RaySpace, [Triangle; LANES])> {
         let (target, dir) = (random.cube(), random.direction() * (0.1 + random.unit()));
         let triangles: [Triangle; LANES] = std::array::from_fn(|_| {
@@ -302,7 +301,7 @@ mod tests {
         Some((ray, triangles.map(|t| t.map(|p| p * scale))))
     }
 
-    /// Some rays of each kind.
+    /// Calls `check` with some rays of each kind.
     fn each_kind(kinds: &[Kind], mut check: impl FnMut(Kind, &RaySpace, &[Triangle; LANES], &Corners8)) {
         let mut random = Random::new(51);
         for &kind in kinds {
@@ -361,7 +360,7 @@ mod tests {
         }
     }
 
-    /// Hits and, of these, those whose exact distance is not where it is said to be.
+    /// Number of hits, and of those whose exact distance is outside its bounds.
     fn misplaced(kinds: &[Kind], margins: [f32; 2], level: Level) -> [usize; 2] {
         let (mut hits, mut outside) = (0, 0);
         each_kind(kinds, |kind, ray, triangles, corners| {

@@ -1,14 +1,14 @@
-//! Ray against sphere, in the form that does not cancel, with running bounds of its errors; where `f64` cannot tell, the same
-//! formula runs in numbers twice as long.
+//! Ray against sphere, in the form that does not cancel, with running bounds of its errors; where `f64` cannot decide, the
+//! same formula runs in double-length numbers.
 //!
 //! After E. Haines, J. Günther, T. Akenine-Möller, *Precision Improvements for Ray/Sphere Intersection*, Ray Tracing
 //! Gems, 2019, chapter 7: the discriminant is r² − |f − (f·d) d|², from the point of the line nearest to the centre,
 //! instead of the difference B² − C of two large squares; and the smaller root comes from the larger one.
-//!
-//! - A distance is within 2½ ulp (`f32`) of the exact one. Beside the origin, below
-//!   [`ROUND_ROOM`](super::bounds::ROUND_ROOM) of the radius, the error is absolute, and what cannot be told from 0 there is
-//!   0: a ray that starts on the sphere hits it at 0.
-//! - The verdict is exact unless the line passes the rim within 2⁻⁹⁰ of the distance from which the ray comes; there it counts
+//! - A distance is within 2½ ulp (`f32`) of the exact one. Near the origin, below [`ROUND_ROOM`](super::bounds::ROUND_ROOM)
+//!   of the radius, the error is absolute, and distances that cannot be told from 0 are 0: a ray that starts on the sphere
+//!   hits it at 0.
+//! - The verdict is exact unless the line passes the rim within 2⁻⁹⁰ of the distance from which the ray comes; there it
+//!   counts as a hit.
 //!   as a hit.
 
 use super::quotient::round;
@@ -16,18 +16,18 @@ use super::real::{Double, Real, Real3};
 use super::shear::RaySpace;
 use super::{DVec3, Vec3};
 
-/// A distance from `f64` is good enough when its relative error is below this: 2 ulp of an `f32` at most.
+/// Largest relative error of an accepted distance from `f64`: at most 2 ulp of an `f32`.
 const GOOD: f64 = 2.0 * super::bounds::U32 as f64;
 
-/// The distances at which the line through the ray enters and leaves the sphere, smaller first, rounded once.
+/// Distances at which the line through the ray enters and leaves the sphere, smaller first, rounded once.
 ///
-/// With `ahead`, spheres that lie wholly behind the origin are rejected before any root: both distances would be
-/// negative. From inside the first distance is negative: the far one counts.
+/// With `ahead`, spheres wholly behind the origin are rejected before any root: both distances would be negative. From
+/// inside, the first distance is negative and the second one counts.
 pub fn intersect(ray: &RaySpace, center: Vec3, radius: f32, ahead: bool) -> Option<[f32; 2]> {
     roots(ray, center, radius, ahead).map(|[near, far]| [round(near), round(far)])
 }
 
-/// As [`intersect`], not rounded.
+/// [`intersect`], not rounded.
 pub fn roots(ray: &RaySpace, center: Vec3, radius: f32, ahead: bool) -> Option<[f64; 2]> {
     let first = match solve::<f64>(ray, center, radius, ahead) {
         Found::Nothing => return None,
@@ -35,7 +35,7 @@ pub fn roots(ray: &RaySpace, center: Vec3, radius: f32, ahead: bool) -> Option<[
         Found::Roots(first) => Some(first),
         Found::Unsure => None,
     };
-    // Each root is decided apart.
+    // Each root is decided separately.
     let Found::Roots(second) = with_care(ray, center, radius) else { return None };
     let better = |i: usize| first.map(|first| first[i]).filter(Root::is_good).unwrap_or(second[i]);
     Some(in_order([better(0), better(1)].map(Root::decided)))
@@ -50,7 +50,7 @@ fn in_order([a, b]: [f64; 2]) -> [f64; 2] {
     if a <= b { [a, b] } else { [b, a] }
 }
 
-/// A distance, and a bound of its error.
+/// A distance with a bound of its error.
 #[derive(Clone, Copy, Debug)]
 struct Root {
     t: f64,
@@ -62,23 +62,23 @@ impl Root {
         self.error <= GOOD * self.t.abs()
     }
 
-    /// The last word: what cannot be told from 0 is 0.
+    /// Final distance: 0 if it cannot be told from 0.
     fn decided(self) -> f64 {
         if self.t.abs() <= self.error { 0.0 } else { self.t }
     }
 }
 
-/// What comes of a line and a sphere.
+/// Result for a line and a sphere.
 enum Found {
     Nothing,
     Roots([Root; 2]),
-    /// It may be a tangent.
+    /// The line may be a tangent.
     Unsure,
 }
 
-/// The roots with running bounds of their errors. A bound counts roundings of [`Real::UNIT`] to first order and rounds the
-/// counts up by half or more, which covers the rest and the rounding of the bounds. In numbers that are twice as long nothing
-/// stays unsure: what may touch, touches.
+/// Roots with running bounds of their errors. A bound counts roundings of [`Real::UNIT`] to first order and rounds the counts
+/// up by half or more, which covers the rest and the rounding of the bounds. In double-length numbers nothing stays unsure: a
+/// line that may touch the sphere touches it.
 fn solve<R: Real>(ray: &RaySpace, center: Vec3, radius: f32, ahead: bool) -> Found {
     let (unit, last) = (R::UNIT, R::UNIT < f64::UNIT);
     let (d, r) = (Real3::<R>::of(ray.dir.as_dvec3()), R::of(f64::from(radius)));
@@ -92,7 +92,7 @@ fn solve<R: Real>(ray: &RaySpace, center: Vec3, radius: f32, ahead: bool) -> Fou
         return Found::Nothing;
     }
 
-    // The way from the point nearest to the centre: the quotient errs by 8 u |f|/|d|, the rest by a few u |f|.
+    // From the centre to the nearest point of the line: the quotient errs by 8 u |f|/|d|, the rest by a few u |f|.
     let nearest = f.minus(d.times(b / length2));
     let past2 = nearest.dot(nearest);
     let discriminant = r2 - past2;
@@ -112,7 +112,7 @@ fn solve<R: Real>(ray: &RaySpace, center: Vec3, radius: f32, ahead: bool) -> Fou
     let error_q = error_b + error_half + 2.0 * unit * q.value().abs();
     let far = (q / length2).value();
     let far = Root { t: far, error: error_q / length2.value() + 16.0 * unit * far.abs() };
-    // The line touches the sphere where the ray starts, or nearly so.
+    // The line touches the sphere at the ray's origin, or nearly so.
     let size = q.value().abs();
     if size <= 2.0 * error_q {
         return Found::Roots([far; 2]);
@@ -122,7 +122,7 @@ fn solve<R: Real>(ray: &RaySpace, center: Vec3, radius: f32, ahead: bool) -> Fou
     Found::Roots([Root { t: near, error }, far])
 }
 
-/// The point of the sphere nearest to `p`, relative to the centre; and the unit normal there, outwards.
+/// Point of the sphere nearest to `p`, relative to the centre; and the outward unit normal there.
 pub fn project(p: DVec3, center: Vec3, radius: f32) -> (DVec3, DVec3) {
     let normal = (p - center.as_dvec3()).normalize_or(DVec3::Z);
     (normal * f64::from(radius), normal)
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn a_sphere_that_is_met_beside_the_start_is_met_there() {
-        // c = |f|² − r² is 5·10⁻²⁵, of which nothing is left in numbers of 53 digits.
+        // c = |f|² − r² is 5·10⁻²⁵, of which nothing remains in numbers of 53 digits.
         let ray = RaySpace::new(Vec3::new(-1e-24, 0.0, 0.0), Vec3::X);
         let hit = ray.and_then(|r| intersect(&r, Vec3::new(0.25, 0.0, 0.0), 0.25, true));
         assert_eq!(hit, Some([1e-24, 0.5]));

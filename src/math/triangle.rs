@@ -1,9 +1,9 @@
-//! The watertight ray/triangle test with exact verdicts.
+//! Watertight ray/triangle test with exact verdicts.
 //!
-//! Sheared ray space (see [`shear`](super::shear)): a triangle is hit when its three edge values all are ≥ 0 or all
-//! ≤ 0 (an edge or corner belongs to every triangle it bounds) and not all are zero. The sign of an edge value is taken
-//! from `f32` when it exceeds its proven error, else from `f64`, else from exact sums. A ray in the triangle's plane and a
-//! triangle without area have three zero edge values or two signs: they are never hit, and no NaN arises.
+//! In sheared ray space (see [`shear`](super::shear)) a triangle is hit if its three edge values are all ≥ 0 or all ≤ 0 (an
+//! edge or corner belongs to every triangle it bounds) and not all zero. The sign of an edge value is taken from `f32` if it
+//! exceeds its proven error, else from `f64`, else from exact sums. For a ray in the triangle's plane and a triangle without
+//! area, the edge values are all zero or have two signs: they are never hit, and no NaN arises.
 
 use super::bounds::{EXACT_QUOTIENT, EdgeMargins, PLANE_TERMS_F64, POSITION_T};
 use super::expansion::{Expansion, cross, difference, dot, dot_f32};
@@ -11,17 +11,17 @@ use super::quotient::{Bounded, approximate, rounded};
 use super::shear::RaySpace;
 use super::{DVec3, Vec3};
 
-/// Three corners.
+/// Triangle by its three corners.
 pub type Triangle = [Vec3; 3];
 
-/// The distance at which the line through the ray meets the triangle, exact and rounded once; negative behind the
-/// origin. `None`: it does not, exactly.
+/// Distance at which the line through the ray hits the triangle, exact and rounded once; negative behind the origin. `None`
+/// for a miss, exactly.
 #[inline]
 pub fn intersect(ray: &RaySpace, triangle: &Triangle) -> Option<f32> {
     is_hit(ray, triangle).then(|| distance(ray, triangle))
 }
 
-/// Whether the line through the ray meets the triangle: the exact verdict.
+/// Whether the line through the ray hits the triangle: the exact verdict.
 #[inline]
 pub fn is_hit(ray: &RaySpace, triangle: &Triangle) -> bool {
     match ray.z {
@@ -31,7 +31,7 @@ pub fn is_hit(ray: &RaySpace, triangle: &Triangle) -> bool {
     }
 }
 
-/// [`is_hit`] for a ray whose largest component is along axis `Z`: coordinates are then picked without looking them up.
+/// [`is_hit`] for a ray whose largest component is along axis `Z`: coordinates are then selected without indexing.
 #[inline]
 fn is_hit_along<const Z: usize>(ray: &RaySpace, triangle: &Triangle) -> bool {
     let [a, b, c] = [triangle[0] - ray.origin, triangle[1] - ray.origin, triangle[2] - ray.origin];
@@ -65,11 +65,11 @@ fn is_hit_along<const Z: usize>(ray: &RaySpace, triangle: &Triangle) -> bool {
     is_hit_near_edge(ray, triangle)
 }
 
-/// As [`is_hit`], for triangles about which `f32` cannot tell.
+/// [`is_hit`] for triangles that `f32` cannot decide.
 #[cold]
 #[inline(never)]
 pub fn is_hit_near_edge(ray: &RaySpace, &[a, b, c]: &Triangle) -> bool {
-    // The signs of two edges that are one, there and back, never agree.
+    // The signs of coinciding edges in opposite directions never agree.
     if a == b || b == c || c == a {
         return false;
     }
@@ -83,18 +83,18 @@ pub fn is_hit_near_edge(ray: &RaySpace, &[a, b, c]: &Triangle) -> bool {
     agree && (first, second, third) != (0, 0, 0)
 }
 
-/// Where a ray meets the plane of a triangle.
+/// Intersection of a ray with the plane of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meeting {
     /// Exact t = n·(a − o) / n·d with n = (b − a) × (c − a), rounded once.
     pub t: f32,
-    /// t to a relative error of [`POSITION_T`], or NaN where [`distance_f64`] must be asked.
+    /// t with a relative error of [`POSITION_T`], or NaN if [`distance_f64`] is needed.
     pub t_f64: f64,
-    /// n.
+    /// The normal n.
     pub normal: DVec3,
 }
 
-/// Where the line through the ray meets a triangle that is hit.
+/// Intersects the line through the ray with a triangle that is hit.
 #[inline]
 pub fn meet(ray: &RaySpace, triangle: &Triangle) -> Meeting {
     let (numerator, denominator, normal) = plane_terms(ray, triangle, PLANE_TERMS_F64);
@@ -112,7 +112,7 @@ pub fn distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
     distance_along(ray.origin, ray.dir, triangle)
 }
 
-/// [`distance`] of a ray that was not made ready; its direction is not zero.
+/// [`distance`] for a ray without a prepared [`RaySpace`]; its direction must not be zero.
 #[inline]
 pub fn distance_along(origin: Vec3, dir: Vec3, triangle: &Triangle) -> f32 {
     let (numerator, denominator) = Flat::of(in_f64(triangle)).terms(origin, dir, PLANE_TERMS_F64);
@@ -123,7 +123,7 @@ pub fn distance_along(origin: Vec3, dir: Vec3, triangle: &Triangle) -> f32 {
 #[cold]
 #[inline(never)]
 fn exact_distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
-    // It starts there.
+    // The ray starts at a corner.
     if triangle.contains(&ray.origin) {
         return 0.0;
     }
@@ -131,13 +131,13 @@ fn exact_distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
     rounded::<192, 384>(&numerator, &denominator)
 }
 
-/// As [`intersect`]'s distance of a triangle that is hit, to a relative error of [`POSITION_T`].
+/// Distance of [`intersect`] to a triangle that is hit, with a relative error of [`POSITION_T`].
 pub fn distance_f64(ray: &RaySpace, triangle: &Triangle) -> f64 {
     const { assert!(EXACT_QUOTIENT < POSITION_T) };
     distance_within(ray, triangle, POSITION_T)
 }
 
-/// The distance of a triangle that is hit, to a relative error of `enough`, which is more than [`EXACT_QUOTIENT`].
+/// Distance to a triangle that is hit, with a relative error of `enough`, which is more than [`EXACT_QUOTIENT`].
 fn distance_within(ray: &RaySpace, triangle: &Triangle, enough: f64) -> f64 {
     match plane_quotient(ray, triangle, PLANE_TERMS_F64) {
         Some(t) if t.is_within(enough) => t.value,
@@ -148,40 +148,39 @@ fn distance_within(ray: &RaySpace, triangle: &Triangle, enough: f64) -> f64 {
     }
 }
 
-/// t in `f64`, where its error has a bound; `terms` is the relative error of both its terms.
+/// t in `f64` with a bound of its error, if there is one; `terms` is the relative error of both terms.
 #[inline]
 fn plane_quotient(ray: &RaySpace, triangle: &Triangle, terms: f64) -> Option<Bounded> {
     let (numerator, denominator, _) = plane_terms(ray, triangle, terms);
     numerator.over(denominator)
 }
 
-/// What rays share that meet the plane of one triangle: a, n = (b − a) × (c − a) and |b − a| × |c − a| with sums for
-/// differences.
+/// Plane of a triangle, shared by all rays: a, n = (b − a) × (c − a), and |b − a| × |c − a| with sums for differences.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Flat {
-    /// a.
+    /// Corner a.
     pub corner: DVec3,
-    /// n.
+    /// Normal n, not normalised.
     pub normal: DVec3,
-    /// What bounds the rounding of n.
+    /// Bound of the rounding of n, up to a factor.
     pub sizes: DVec3,
 }
 
 impl Flat {
-    /// The plane of a triangle.
+    /// Computes the plane of a triangle.
     #[inline(always)]
     pub fn of([a, b, c]: [DVec3; 3]) -> Self {
         let (e1, e2) = (b - a, c - a);
         Self { corner: a, normal: e1.cross(e2), sizes: magnitude_cross(e1.abs(), e2.abs()) }
     }
 
-    /// [`normal`](fn@normal).
+    /// Unit normal, as in [`normal`](fn@normal).
     #[inline]
     pub fn unit(&self) -> Vec3 {
         self.normal.normalize_or_zero().as_vec3()
     }
 
-    /// [`distance_f64`] of a triangle that is hit, or `None` where the bound of its error is not good enough.
+    /// [`distance_f64`] to a triangle that is hit, or `None` if the bound of its error is not good enough.
     #[inline(always)]
     pub fn distance(&self, origin: Vec3, dir: Vec3) -> Option<f64> {
         let (numerator, denominator) = self.terms(origin, dir, PLANE_TERMS_F64);
@@ -207,7 +206,7 @@ fn plane_terms(ray: &RaySpace, triangle: &Triangle, terms: f64) -> (Bounded, Bou
     (numerator, denominator, flat.normal)
 }
 
-/// |p| × |q| with sums for differences: bounds what rounding can do to the cross product.
+/// |p| × |q| with sums for differences: bounds the rounding of the cross product.
 #[inline(always)]
 pub(super) fn magnitude_cross(p: DVec3, q: DVec3) -> DVec3 {
     DVec3::new(p.y * q.z + p.z * q.y, p.z * q.x + p.x * q.z, p.x * q.y + p.y * q.x)
@@ -221,13 +220,13 @@ fn exact_plane_terms(ray: &RaySpace, &[a, b, c]: &Triangle) -> (Expansion<192>, 
     (dot(&normal, &difference(a, ray.origin.to_array())), dot_f32(&normal, ray.dir.to_array()))
 }
 
-/// Weights of the second and third corner where the ray meets a triangle that it hits, each in 0..=1.
+/// Barycentric weights of the second and third corner at the ray's hit with a triangle, each in 0..=1.
 pub fn barycentrics(ray: &RaySpace, triangle: &Triangle) -> (f32, f32) {
     let [a, b, c] = in_f64(triangle);
     barycentrics_at(ray, triangle, distance_f64(ray, triangle), (b - a).cross(c - a))
 }
 
-/// The distance of [`meet`] and these weights.
+/// Distance of [`meet`], and the barycentric weights of the second and third corner.
 pub fn place(ray: &RaySpace, triangle: &Triangle) -> (f32, f32, f32) {
     let Meeting { t, t_f64, normal } = meet(ray, triangle);
     let (u, v) =
@@ -235,10 +234,10 @@ pub fn place(ray: &RaySpace, triangle: &Triangle) -> (f32, f32, f32) {
     (t, u, v)
 }
 
-/// Weights of the second and third corner at the distance and with the normal that [`meet`] found, or at that of
+/// Barycentric weights of the second and third corner at the distance and with the normal of [`meet`], or at that of
 /// [`distance_f64`] with the normal (b − a) × (c − a).
 ///
-/// Areas in the plane of the triangle, seen along the axis from which they are largest, so that a grazing ray is no worse
+/// Areas in the plane of the triangle, projected along the axis in which they are largest, so that a grazing ray is no worse
 /// than another.
 #[inline]
 pub fn barycentrics_at(ray: &RaySpace, &[a, b, c]: &Triangle, t: f64, normal: DVec3) -> (f32, f32) {
@@ -254,7 +253,7 @@ pub fn barycentrics_at(ray: &RaySpace, &[a, b, c]: &Triangle, t: f64, normal: DV
     if u + v > 1.0 { (u, 1.0 - u) } else { (u, v) }
 }
 
-/// The axes of the plane in which a face with this normal is seen largest, in right-handed order.
+/// Axes of the projection in which a face with this normal is largest, in right-handed order.
 #[inline(always)]
 pub fn flat_axes(normal: DVec3) -> [usize; 2] {
     let size = normal.abs();
@@ -273,13 +272,13 @@ pub fn in_f64(&[a, b, c]: &Triangle) -> [DVec3; 3] {
     [a.as_dvec3(), b.as_dvec3(), c.as_dvec3()]
 }
 
-/// A point of the triangle; evenly spread where `r` and `s` are, in 0..=1.
+/// Point of the triangle; uniformly distributed if `r` and `s` are, in 0..=1.
 pub fn within(&[a, b, c]: &Triangle, r: f32, s: f32) -> Vec3 {
     let (r, s) = if r + s > 1.0 { (1.0 - r, 1.0 - s) } else { (r, s) };
     a + (b - a) * r + (c - a) * s
 }
 
-/// Unit normal, towards the side from which the corners run counter-clockwise; zero for a triangle without area.
+/// Unit normal, towards the side from which the corners are counter-clockwise; zero for a triangle without area.
 pub fn normal(triangle: &Triangle) -> Vec3 {
     Flat::of(in_f64(triangle)).unit()
 }
@@ -294,7 +293,7 @@ fn largest3(a: f32, b: f32, c: f32) -> f32 {
     greater(a, greater(b, c))
 }
 
-/// One instruction, unlike `f32::max`; takes the second operand when one is NaN.
+/// A single instruction, unlike `f32::max`; returns the second operand if one is NaN.
 #[inline]
 fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
@@ -311,7 +310,7 @@ mod tests {
     use super::super::rational::{hit, point};
     use super::*;
 
-    /// Triangles seen nearly edge on, by rays that hit them.
+    /// Calls `check` with nearly edge-on triangles, and rays that hit them.
     fn each_grazing(mut check: impl FnMut(&RaySpace, &Triangle)) {
         let mut random = Random::new(10);
         for _ in 0..400 {
@@ -325,7 +324,7 @@ mod tests {
         }
     }
 
-    /// The largest relative error of distances that are taken from `f64` where its bound is below `enough`.
+    /// Largest relative error of distances that are accepted from `f64` if their bound is below `enough`.
     fn worst(enough: f64) -> f64 {
         let mut worst = 0.0f64;
         each_grazing(|ray, triangle| {
@@ -335,7 +334,7 @@ mod tests {
         worst
     }
 
-    /// How often the nearest float is taken from `f64` and is not the nearest.
+    /// Number of floats that are accepted from `f64` and are not the nearest.
     fn wrongly_rounded(terms: f64) -> usize {
         let mut wrong = 0;
         each_grazing(|ray, triangle| {

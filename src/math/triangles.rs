@@ -1,8 +1,7 @@
 //! Eight triangles against one ray: the filter of [`triangle`](super::triangle) in eight lanes.
 //!
-//! Edge values are computed as there, operation by operation, and their bound from the farthest that any triangle of
-//! the scene may be; what this cannot decide is left to the scalar form. Verdicts are exact, so it does not matter which of
-//! the two found them.
+//! Edge values are computed as there, operation by operation, with an error bound from the farthest possible triangle of the
+//! scene; undecided lanes are left to the scalar form. Verdicts are exact, so it does not matter which of the two found them.
 
 use super::Vec3;
 use super::aabb::Aabb;
@@ -13,7 +12,7 @@ use super::simd::{LANES, Lanewise, Row, Simd};
 /// Corners of eight triangles, by corner and axis.
 pub type Corners8 = [[Row; 3]; 3];
 
-/// No coordinate of what lies in the box is farther from that of the origin.
+/// Largest distance, on any axis, from the origin to a point in the box.
 #[inline(always)]
 pub fn reach(origin: Vec3, bounds: &Aabb) -> f32 {
     // Subtraction is monotonic, rounded or not.
@@ -28,17 +27,17 @@ pub fn reach(origin: Vec3, bounds: &Aabb) -> f32 {
     if most > z { most } else { z }
 }
 
-/// The triangle in a lane.
+/// Triangle in a lane.
 #[inline(always)]
 pub fn corners_of(corners: &Corners8, lane: usize) -> [Vec3; 3] {
     let corner = |c: &[Row; 3]| Vec3::new(c[0][lane % LANES], c[1][lane % LANES], c[2][lane % LANES]);
     [corner(&corners[0]), corner(&corners[1]), corner(&corners[2])]
 }
 
-/// Lanes without a triangle: a NaN in every corner.
+/// Eight empty lanes: NaN in every corner.
 pub const NO_CORNERS: Corners8 = [[[f32::NAN; LANES]; 3]; 3];
 
-/// Puts a triangle into one lane.
+/// Stores a triangle in one lane.
 pub fn set_corners(corners: &mut Corners8, lane: usize, triangle: &[Vec3; 3]) {
     for (rows, corner) in corners.iter_mut().zip(triangle) {
         for (row, x) in rows.iter_mut().zip(corner.to_array()) {
@@ -47,28 +46,28 @@ pub fn set_corners(corners: &mut Corners8, lane: usize, triangle: &[Vec3; 3]) {
     }
 }
 
-/// A ray ready to be tested against blocks.
+/// A ray prepared for tests against blocks.
 pub struct RayLanes<S: Simd> {
     /// Axes in sheared order: x, y, z.
     axes: [usize; 3],
     /// Origin along these axes.
     origin: [S::Lanes; 3],
     shear: [S::Lanes; 2],
-    /// No corner is farther from the origin on any axis.
+    /// Largest distance of a corner from the origin on any axis.
     reach: S::Lanes,
 }
 
-/// Which lanes are hit; a bit of neither mask is a certain miss.
+/// Verdicts as bit masks of lanes; a lane in neither mask is a certain miss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Verdicts {
-    /// The line through the ray meets the triangle for certain.
+    /// Lanes whose triangle the line through the ray hits for certain.
     pub hit: u32,
-    /// A closer look is needed. Lanes without a triangle are among these.
+    /// Lanes that need the exact test. Empty lanes are among these.
     pub unsure: u32,
 }
 
 impl<S: Simd> RayLanes<S> {
-    /// Spreads a ray over the lanes; none of the triangles that it is tested against is farther than `reach` ([`reach`]).
+    /// Broadcasts a ray to the lanes; no triangle tested against it may be farther than `reach` ([`reach`]).
     #[inline(always)]
     pub fn new(s: S, ray: &RaySpace, reach: f32) -> Self {
         let axes = [ray.x, ray.y, ray.z];
@@ -82,14 +81,14 @@ impl<S: Simd> RayLanes<S> {
         self.verdicts_within(s, corners, EdgeMargins::DERIVED)
     }
 
-    /// [`Self::verdicts`] by given margins.
+    /// [`Self::verdicts`] with given margins.
     #[inline(always)]
     fn verdicts_within(&self, s: S, corners: &Corners8, margins: EdgeMargins) -> Verdicts {
         let [a, b, c] = [self.relative(s, &corners[0]), self.relative(s, &corners[1]), self.relative(s, &corners[2])];
         judge(s, [self.sheared(s, a), self.sheared(s, b), self.sheared(s, c)], self.reach, margins)
     }
 
-    /// A corner relative to the origin, in sheared order.
+    /// Corner relative to the origin, in sheared order.
     #[inline(always)]
     fn relative(&self, s: S, corner: &[Row; 3]) -> [S::Lanes; 3] {
         let [x, y, z] = self.axes;
@@ -106,7 +105,7 @@ impl<S: Simd> RayLanes<S> {
     }
 }
 
-/// The verdicts on triangles by their sheared corners, where that is certain.
+/// Verdicts on triangles by their sheared corners, where they are certain.
 #[inline(always)]
 fn judge<S: Lanewise<N>, const N: usize>(
     s: S,
@@ -143,7 +142,7 @@ pub(super) mod tests {
     use super::super::triangle;
     use super::*;
 
-    /// As [`reach`], of the corners themselves.
+    /// [`reach`] of the corners themselves.
     fn farthest(ray: &RaySpace, corners: &Corners8) -> f32 {
         let place = |k: usize| corners.iter().flat_map(move |corner| corner[k]);
         (0..3).flat_map(|k| place(k).map(move |x| (x - ray.origin[k]).abs())).fold(0.0, f32::max)
@@ -160,8 +159,8 @@ pub(super) mod tests {
         }
     }
 
-    /// Triangles of all sizes, rays at random and at corners and edges, scaled by 2^exponent; the triangles themselves
-    /// smaller by 2^smaller.
+    /// Calls `check` with triangles of all sizes and with rays at random and at corners and edges, scaled by 2^exponent; the
+    /// triangles themselves are smaller by 2^smaller.
     pub(in super::super) fn each_case(
         exponent: i32,
         smaller: i32,
@@ -207,7 +206,7 @@ pub(super) mod tests {
         }
     }
 
-    /// Small triangles seen from far away, so small that the terms of the bound itself are rounded to nothing.
+    /// Small triangles from so far away that the terms of the bound itself are rounded to nothing.
     #[test]
     fn verdicts_hold_where_edge_values_are_the_smallest_numbers() {
         let mut certain = 0;
@@ -238,7 +237,7 @@ pub(super) mod tests {
         }
     }
 
-    /// Verdicts that are called certain by these margins, and are wrong, of numbers around 2^exponent.
+    /// Number of wrong verdicts that count as certain with these margins, with numbers around 2^exponent.
     fn wrong(margins: EdgeMargins, exponents: std::ops::Range<i32>) -> u32 {
         let mut wrong = 0;
         for exponent in exponents {

@@ -1,9 +1,9 @@
-//! The comparator: S. Woop, C. Benthin, I. Wald, *Watertight Ray/Triangle Intersection*, 2013, as published.
+//! Test for comparison: S. Woop, C. Benthin, I. Wald, *Watertight Ray/Triangle Intersection*, 2013, as published.
 //!
-//! Edge values in sheared ray space; in `f32` an edge value of exactly zero is computed again in `f64`, where the products
-//! are exact. A shared corner has the same sheared place in all its triangles, so that no ray slips between them; but
-//! those places are rounded, so that a verdict near an edge can be that of a triangle a little displaced, and t comes from
-//! the rounded edge values. The default test ([`triangle`](super::triangle)) has neither error.
+//! Edge values in sheared ray space; in `f32` an edge value of exactly zero is recomputed in `f64`, where the products are
+//! exact. A shared corner has the same sheared position in all its triangles, so that no ray slips between them; but those
+//! positions are rounded, so that a verdict near an edge can be that of a slightly displaced triangle, and t comes from the
+//! rounded edge values. The default test ([`triangle`](super::triangle)) has neither error.
 
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -11,7 +11,7 @@ use super::Vec3;
 use super::shear::RaySpace;
 use super::triangle::Triangle;
 
-/// `f32` or `f64`.
+/// Either `f32` or `f64`.
 pub trait Real:
     Copy + PartialOrd + From<f32> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
@@ -20,7 +20,7 @@ pub trait Real:
 impl Real for f32 {}
 impl Real for f64 {}
 
-/// What the tests of one ray share.
+/// Shear of a ray, shared by all its tests.
 #[derive(Clone, Copy, Debug)]
 pub struct Shear<T> {
     x: T,
@@ -29,7 +29,7 @@ pub struct Shear<T> {
 }
 
 impl<T: Real> Shear<T> {
-    /// Of a ray.
+    /// Computes the shear of a ray.
     pub fn new(ray: &RaySpace) -> Self {
         let [x, y, z] = [ray.x, ray.y, ray.z].map(|k| T::from(ray.dir[k]));
         Self { x: x / z, y: y / z, z: T::from(1.0) / z }
@@ -41,7 +41,7 @@ impl<T: Real> Shear<T> {
         [x - self.x * z, y - self.y * z, self.z * z]
     }
 
-    /// The distance at which the line through the ray meets the triangle.
+    /// Distance at which the line through the ray hits the triangle.
     #[inline]
     pub fn intersect(&self, ray: &RaySpace, triangle: &Triangle, edges: impl Fn([[T; 3]; 3]) -> [T; 3]) -> Option<T> {
         let zero = T::from(0.0);
@@ -63,7 +63,7 @@ pub fn edges<T: Real>([a, b, c]: [[T; 3]; 3]) -> [T; 3] {
     [c[0] * b[1] - c[1] * b[0], a[0] * c[1] - a[1] * c[0], b[0] * a[1] - b[1] * a[0]]
 }
 
-/// As [`edges`]; where one is zero, all from exact products.
+/// [`edges`]; if one is zero, all are recomputed from exact products.
 pub fn edges_checked(corners: [[f32; 3]; 3]) -> [f32; 3] {
     let fast = edges(corners);
     if fast.contains(&0.0) {
@@ -100,7 +100,7 @@ mod tests {
             let target = Vec3::X.lerp(Vec3::Y, i as f32 / 100.0);
             let origin = Vec3::new(0.4, 0.3, 4.0);
             let (one, other) = (both(origin, target - origin, &t), both(origin, target - origin, &s));
-            // The corners also border on nothing.
+            // The end points of the edge also border on nothing.
             let inside = (1..100).contains(&i);
             assert!(!inside || (0..2).all(|k| one[k].is_some() || other[k].is_some()), "{target}");
         }
@@ -120,7 +120,7 @@ mod tests {
                 let (a, b, origin) =
                     (random.cube() * 0.1, random.cube() * 0.1 + Vec3::X, random.cube() + Vec3::Z * 4.0);
                 let (c, d) = (Vec3::new(0.5, 1.0, random.unit()), Vec3::new(0.5, -1.0, random.unit()));
-                // Through the edge of both triangles.
+                // Exactly through the edge shared by both triangles.
                 let target = a + (b - a) * (0.25 + 0.5 * random.unit());
                 let Some(ray) = RaySpace::new(origin, target - origin) else { continue };
                 let shear = Shear::<f32>::new(&ray);

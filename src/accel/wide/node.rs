@@ -81,7 +81,7 @@ impl Child {
         }
     }
 
-    /// Whether a packed child is no node.
+    /// Whether a packed child is a leaf.
     #[inline(always)]
     pub(super) fn is_leaf(word: u32) -> bool {
         word & Self::LEAF != 0

@@ -1,4 +1,4 @@
-//! However the rays of a batch are traced, on whatever instruction set: the answers are those of brute force.
+//! Every trace mode on every instruction set gives the answers of brute force.
 
 use super::entry_point::GROUP;
 use super::flight::{DEPTH, FARTHEST_FIRST};
@@ -12,7 +12,7 @@ use crate::math::simd::{Level, WIDE};
 
 const MODES: [TraceMode; 4] = [TraceMode::OneByOne, TraceMode::InFlight, TraceMode::Packets, TraceMode::Adaptive];
 
-/// First hits, the hits behind them, what is blocked, and what would be if some of the rest let light through.
+/// First hits, the hits behind them, occlusion, and occlusion with a filter that lets light through some of the other prims.
 fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> String {
     let mut scratch = accel.scratch();
     let hits = first_hits(accel, rays);
@@ -32,13 +32,13 @@ fn first_hits<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<Hit> {
     hits
 }
 
-/// For some rays sixteen side by side that start with them, every other time each from a place of its own: most packets
+/// For some of the rays, sixteen side by side that start with them, for every other one from separate origins: most packets
 /// run alike, some straddle an octant.
 fn packets(rays: &[Ray]) -> Vec<Ray> {
     side_by_side(rays, 16)
 }
 
-/// Rays in packets of so many.
+/// For each ray, a packet of `count` rays.
 fn side_by_side(rays: &[Ray], count: usize) -> Vec<Ray> {
     let packet = |(i, ray): (usize, &Ray)| {
         let (ray, width) = (*ray, ray.dir.length() * 0.03);
@@ -77,8 +77,8 @@ fn rays_that_run_alike_hit_what_brute_force_hits() {
     }
 }
 
-/// Of sixteen rays that run alike, or thirty-two, some, the first among them or not, run back, along another axis, or
-/// have no range or no place that boxes could be asked about.
+/// In packets of sixteen or thirty-two rays that run alike, some rays, perhaps the first, run backwards or along another
+/// axis, have no range, or have an origin for which boxes cannot be tested.
 #[test]
 fn rays_among_others_that_run_otherwise_hit_what_brute_force_hits() {
     let mut r = Random::new(72);
@@ -115,7 +115,7 @@ fn the_rays_of_a_pencil_hit_what_they_hit_one_by_one() {
             let (sharp, along) = ([0.02, 0.3, 3.0][k % 3], k % 4 == 0);
             let turned = |_| {
                 let dir = from.dir + random.cube() * (sharp * from.dir.length());
-                // Some run along an axis, with components of zero.
+                // Some run along an axis, with zero components.
                 ray(
                     from.origin,
                     if along { dir * Vec3::new(1.0, 0.0, if k % 8 == 0 { 0.0 } else { 1.0 }) } else { dir },
@@ -127,7 +127,7 @@ fn the_rays_of_a_pencil_hit_what_they_hit_one_by_one() {
     }
 }
 
-/// Rays that start together hit what brute force hits, however they are traced.
+/// Asserts that rays of a pencil hit what brute force hits, in every trace mode.
 fn assert_a_pencil_hits(name: &str, shapes: &Shapes, rays: &[Ray], ways: &[TraceMode]) {
     let Some(Ray { origin, .. }) = rays.first().copied() else { return };
     let dirs = [0, 1, 2].map(|k| rays.iter().map(|ray| ray.dir[k]).collect::<Vec<f32>>());
@@ -145,8 +145,8 @@ fn assert_a_pencil_hits(name: &str, shapes: &Shapes, rays: &[Ray], ways: &[Trace
     }
 }
 
-/// Crowds of packets enter the tree together: from outside and from within, wide and narrow, with a ray among them that runs
-/// otherwise or along an axis, or cannot be asked about boxes; and past everything.
+/// Groups of packets enter the tree together: from outside and from within, wide and narrow, some with a ray that diverges,
+/// runs along an axis, or cannot be tested against boxes; some past everything.
 #[test]
 fn crowds_of_a_pencil_hit_what_brute_force_hits() {
     let mut random = Random::new(78);
@@ -176,7 +176,7 @@ fn crowds_of_a_pencil_hit_what_brute_force_hits() {
     }
 }
 
-/// Rays find nothing where they meet some of what is not opaque.
+/// Filter that rejects most hits with prims that are not opaque.
 struct Lattice<'s>(&'s Shapes);
 
 impl IntersectFilter for Lattice<'_> {
@@ -186,7 +186,7 @@ impl IntersectFilter for Lattice<'_> {
     }
 }
 
-/// What rays are said to hit is what they hit behind gaps alone; how many hits were passed.
+/// Asserts that rays pass only hits that the filter rejects before the hit they report; returns the number of hits passed.
 fn passed(shapes: &Shapes, wide: &Wide, rays: &[Ray], after: Option<&[Hit]>, what: &str) -> usize {
     let (brute, filter) = (Unculled::new(shapes), Lattice(shapes));
     let (mut hits, mut count) = (vec![Hit::MISS; rays.len()], 0);
@@ -255,7 +255,7 @@ fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not_and_there
     let toward = |k: usize| Ray { dir: Vec3::new(1.0, 2.0 + k as f32 * 0.01, 3.0), ..mixed[0] };
     assert_eq!(of(&(0..64).map(toward).collect::<Vec<_>>()), TraceMode::Packets);
     assert_eq!(of(&mixed[..9]), TraceMode::OneByOne);
-    // Of long batches some packets are asked, and not only the first.
+    // Of long batches a sample of packets is examined, not only the first ones.
     let long = |rays: &dyn Fn(usize) -> Ray| (0..WIDE * ASKED * 3).map(rays).collect::<Vec<_>>();
     let turning = |k: usize| mixed[k % mixed.len()];
     let half = |first: bool| move |k: usize| if (k < WIDE * ASKED) == first { toward(k % 64) } else { turning(k) };
@@ -274,8 +274,8 @@ fn orders_list_the_lanes_of_a_mask_the_farthest_first() {
     }
 }
 
-/// Rays exactly along axes, or nearly, or along the diagonals of two axes, some from `far` away, whose other coordinates
-/// are those of corners: within planes of boxes, along their edges and through their corners.
+/// Rays exactly along axes, or nearly, or along the diagonals of two axes, some from `far` away, whose other coordinates are
+/// those of corners: in the planes of boxes, along their edges and through their corners.
 fn along_axes(shapes: &Shapes, n: usize, far: f32) -> Vec<Ray> {
     let mut r = Random::new(71);
     let slight = [0.0, -0.0, 1e-12, -1e-12, 1e-20, -1e-26, 1e-30, -1e-30, 1e-9, -1e-9, 1.0, -1.0];
@@ -310,7 +310,7 @@ fn rays_along_axes_within_the_planes_of_boxes_hit_what_brute_force_hits() {
     }
 }
 
-/// Triangles ever smaller and nearer to the origin.
+/// Triangles that become ever smaller and nearer to the origin.
 fn progression(n: u32, ratio: f32) -> Shapes {
     let corners = |i: u32| {
         let size = (1u64 << 60) as f32 * ratio.powi(i as i32);
@@ -341,7 +341,7 @@ fn trees_too_deep_for_rays_in_flight_are_answered() {
     }
 }
 
-/// How far it may drift from its plane is a matter of the way along its main axis, not of the other coordinates.
+/// How far a ray may drift from its plane depends on its way along its main axis, not on the other coordinates.
 #[test]
 fn rays_along_axes_from_far_away_hit_what_brute_force_hits() {
     let shapes = scenes::lattice(120);
@@ -350,7 +350,7 @@ fn rays_along_axes_from_far_away_hit_what_brute_force_hits() {
     }
 }
 
-/// What they start on lies in boxes that they leave at once, or whose planes they start on.
+/// The prims on which they start lie in boxes that they leave at once, or on whose planes they start.
 #[test]
 fn rays_that_start_on_what_they_hit_hit_it() {
     let mut r = Random::new(74);

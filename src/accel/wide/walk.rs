@@ -1,4 +1,4 @@
-//! The way of one ray down the tree, nearer children first.
+//! Traversal of the tree by a single ray, nearer children first.
 
 use std::marker::PhantomData;
 
@@ -14,39 +14,39 @@ use crate::math::Vec3;
 use crate::math::simd::{Kernel, LANES, Portable, Simd};
 use crate::math::triangles::{RayLanes, reach};
 
-/// A child still to be visited, and the distance at which the ray enters its box.
+/// A child still to be visited, with the distance at which the ray enters its box.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Entry {
     pub near: f32,
     pub child: u32,
 }
 
-/// Children still to be visited, the nearest last. As long as the tree is deep can make it.
+/// Stack of children still to be visited, the nearest last, with room for the depth of its tree.
 #[derive(Clone, Debug, Default)]
 pub struct Stack {
-    /// Of one ray.
+    /// Entries of one ray.
     pub(super) entries: Vec<Entry>,
-    /// Of a packet.
+    /// Entries of a packet.
     pub(super) branches: Vec<StackEntry>,
     pub(super) cache: BlockCache,
-    /// Of many rays.
+    /// Slots of the rays in flight.
     pub(super) slots: Slots,
 }
 
 impl Stack {
-    /// How many children of one ray it can hold.
+    /// Largest number of children of one ray that fit.
     pub(in crate::accel) fn len(&self) -> usize {
         self.entries.len()
     }
 
-    /// For walks down `tree`.
+    /// Creates a stack for walks down `tree`.
     pub(super) fn new(tree: &Tree) -> Self {
         let most = tree.most_behind();
         Self { entries: vec![Entry::default(); most], branches: vec![StackEntry::default(); most], ..Self::default() }
     }
 }
 
-/// Rays one after another.
+/// Kernel that traces rays one after another.
 pub(super) struct OneByOne<'w, W, P, B> {
     pub tree: &'w Tree<'w>,
     pub shapes: &'w Shapes,
@@ -74,7 +74,7 @@ impl<W: QueryBatch, P: Probe, B: BoxMargins> Kernel for OneByOne<'_, W, P, B> {
                 ask::<B, _, _, _>(s, tree, shapes, batch, i, stack, probe);
                 continue;
             }
-            // Many rays meet no box at all: those need no more than this.
+            // Many rays meet no box at all, and need no more than this.
             let slabs = Slabs::<B>::new(ray.origin, ray.dir, batch.t_min(i));
             let met = slabs.meets(s, root, B::widened(ray.t_max));
             if P::SILENT && met.1 == 0 {
@@ -97,7 +97,7 @@ fn has_direction(dir: Vec3) -> bool {
     (x <= f32::MAX) & (y <= f32::MAX) & (z <= f32::MAX) & ((x > 0.0) | (y > 0.0) | (z > 0.0))
 }
 
-/// A ray that padded boxes cannot be asked about. Such rays are rare: code for one instruction set will do.
+/// Traces a ray that cannot be tested against padded boxes. Such rays are rare: code for one instruction set suffices.
 #[cold]
 #[inline(never)]
 pub(super) fn ask_by_itself<B: BoxMargins, W: QueryBatch>(
@@ -110,7 +110,7 @@ pub(super) fn ask_by_itself<B: BoxMargins, W: QueryBatch>(
     ask::<B, _, _, _>(Portable, tree, shapes, batch, i, stack, &mut NoProbe);
 }
 
-/// A ray that goes its own way through whatever there is.
+/// Traces a single ray through prims of any kind.
 #[inline(always)]
 fn ask<B: BoxMargins, S: Simd, W: QueryBatch, P: Probe>(
     s: S,
@@ -128,7 +128,7 @@ fn ask<B: BoxMargins, S: Simd, W: QueryBatch, P: Probe>(
     end(batch, i, &query, probe);
 }
 
-/// One query under way.
+/// Kernel that walks one query down the tree.
 pub(super) struct Walk<'w, 'q, G: Goal, P, B> {
     pub tree: &'w Tree<'w>,
     pub query: &'w mut Query<'q, G>,
@@ -146,7 +146,7 @@ impl<G: Goal, P: Probe, B: BoxMargins> Kernel for Walk<'_, '_, G, P, B> {
     }
 }
 
-/// From the root to every leaf that the ray may hit, the nearest first.
+/// Traverses from the root to every leaf that the ray may hit, the nearest first.
 #[inline(always)]
 fn walk<B: BoxMargins, S: Simd, G: Goal, P: Probe>(
     s: S,
@@ -166,7 +166,7 @@ fn walk<B: BoxMargins, S: Simd, G: Goal, P: Probe>(
     descend(s, tree, &slabs, met, query, stack, probe);
 }
 
-/// From the root, whose boxes are `met`, to every leaf that the ray may hit, the nearest first.
+/// Traverses from the root, of whose boxes the ray meets `met`, to every leaf that the ray may hit, the nearest first.
 #[inline(always)]
 fn descend<B: BoxMargins, S: Simd, G: Goal, P: Probe>(
     s: S,
@@ -215,7 +215,7 @@ fn descend<B: BoxMargins, S: Simd, G: Goal, P: Probe>(
     }
 }
 
-/// The next child that may hold a hit up to `limit`.
+/// Pops the next child that may hold a hit up to `limit`.
 #[inline(always)]
 pub(super) fn pop(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
     while *top > 0 {
@@ -228,7 +228,7 @@ pub(super) fn pop(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
     None
 }
 
-/// Tests the prims of a leaf, and tells whether the query is answered.
+/// Tests the prims of a leaf, and returns whether the query is answered.
 #[inline(always)]
 fn test_leaf<S: Simd, G: Goal, P: Probe>(
     s: S,
@@ -252,7 +252,7 @@ fn test_leaf<S: Simd, G: Goal, P: Probe>(
     }
 }
 
-/// Puts the children that are met, one at least, on the stack, but for the nearest, which is returned.
+/// Pushes the children in `met`, of which there must be at least one, except the nearest, which is returned.
 #[inline(always)]
 pub(super) fn nearest<S: Simd>(
     s: S,
@@ -275,7 +275,7 @@ pub(super) fn nearest<S: Simd>(
         let next = entry(met.trailing_zeros() as usize % LANES);
         met &= met - 1;
         let farther = if next.near < nearest.near { std::mem::replace(&mut nearest, next) } else { next };
-        // Insertion: the farther ones lie deeper.
+        // Insertion sort: farther entries lie deeper.
         let mut at = *top;
         while at > bottom && stack[at - 1].near < farther.near {
             stack[at] = stack[at - 1];

@@ -1,13 +1,13 @@
-//! Ray against the mantle of a truncated cone (a cylinder where both radii are equal), open at both ends.
+//! Ray against the mantle of a truncated cone (a cylinder if both radii are equal), open at both ends.
 //!
-//! Every number is in a form that does not cancel (`roots`), with a running bound of its error; where `f64` cannot
-//! tell, the same formula runs in numbers twice as long. What this gives, for the `f32` ray and cone:
+//! Every number is in a form that does not cancel (`roots`), with a running bound of its error; where `f64` cannot decide,
+//! the same formula runs in double-length numbers. The results, for the `f32` ray and cone:
 //!
-//! - A distance is within 2½ ulp (`f32`) of the exact one. Below 2⁻⁸⁰ of the cone's size, beside the origin, the error is
-//!   absolute, and what cannot be told from 0 there is 0: a ray that starts on the mantle hits it at 0.
-//! - The verdict (hit or not) is exact unless the line passes the outline or a rim within 2⁻⁸⁰ of the distance from
-//!   which the ray comes; there it counts as a hit: a tangent, a rim and an apex are hit.
-//! - A line that runs in the mantle has no single point of it and does not hit, as with triangles.
+//! - A distance is within 2½ ulp (`f32`) of the exact one. Below 2⁻⁸⁰ of the cone's size, near the origin, the error is
+//!   absolute, and distances that cannot be told from 0 are 0: a ray that starts on the mantle hits it at 0.
+//! - The verdict (hit or not) is exact unless the line passes the outline or a rim within 2⁻⁸⁰ of the distance from which the
+//!   ray comes; there it counts as a hit: a tangent, a rim and an apex are hit.
+//! - A line that runs in the mantle has no single point in common with it and does not hit, as with triangles.
 
 mod roots;
 #[cfg(test)]
@@ -18,20 +18,20 @@ use super::quotient::round;
 use super::shear::RaySpace;
 use super::{DVec3, Vec3};
 
-/// The mantle between two circles around one axis.
+/// Mantle between two circles around one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     /// Centre of one end.
     pub base: Vec3,
-    /// Radius there; 0 or more, and not 0 at both ends.
+    /// Radius at the base; 0 or more, and not 0 at both ends.
     pub base_radius: f32,
-    /// Centre of the other end. Where it equals `base`, nothing is hit.
+    /// Centre of the other end. If it equals `base`, nothing is hit.
     pub apex: Vec3,
-    /// Radius there.
+    /// Radius at the apex.
     pub apex_radius: f32,
 }
 
-/// The distances at which the line through the ray meets the mantle, smaller first, NaN for "not"; rounded once.
+/// Distances at which the line through the ray meets the mantle, smaller first, NaN for none; rounded once.
 ///
 /// With `ahead`, negative distances may be left out.
 pub fn intersect(ray: &RaySpace, cone: &Cone, ahead: bool) -> [f32; 2] {
@@ -40,13 +40,13 @@ pub fn intersect(ray: &RaySpace, cone: &Cone, ahead: bool) -> [f32; 2] {
     if a <= b || b.is_nan() { [a, b] } else { [b, a] }
 }
 
-/// As [`intersect`], not rounded and in no order.
+/// [`intersect`], not rounded and in no order.
 pub fn distances(ray: &RaySpace, cone: &Cone, ahead: bool) -> [f64; 2] {
     roots::distances(ray, cone, ahead)
 }
 
 impl Cone {
-    /// A box around the mantle, each side less than two floats too far out.
+    /// Box around the mantle, each side less than two floats too far out.
     ///
     /// A circle of radius r across the unit axis a reaches r √(1 − aₖ²) along axis k.
     #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
@@ -71,14 +71,14 @@ impl Cone {
         }
     }
 
-    /// The longest of its axis, measured along the coordinate axis along which it is longest, and its radii.
+    /// Largest of the radii and the axis, which is measured along its largest component.
     pub fn size(&self) -> f32 {
         let length = (self.apex - self.base).abs().max_element();
         length.max(self.base_radius).max(self.apex_radius).min(f32::MAX)
     }
 
-    /// The point of the mantle nearest to `p`, which is near to it, relative to the base; the size of what was rounded
-    /// on the way; and the unit normal there, outwards.
+    /// Point of the mantle nearest to `p`, which is near it, relative to the base; the size of the numbers rounded in
+    /// between; and the outward unit normal there.
     pub fn project(&self, p: DVec3) -> (DVec3, f64, DVec3) {
         let profile = Profile::new(self);
         let p = p - self.base.as_dvec3();
@@ -94,22 +94,22 @@ impl Cone {
     }
 }
 
-/// The cone in a half plane through its axis, where the mantle is the segment from (0, base radius) to (length, apex
-/// radius).
+/// Profile of the cone in a half plane through its axis, where the mantle is the segment from (0, base radius) to (length,
+/// apex radius).
 #[derive(Clone, Copy, Debug)]
 pub struct Profile {
     /// Unit axis, from base to apex.
     pub axis: DVec3,
-    /// Distance of the ends.
+    /// Distance between the ends.
     pub length: f64,
-    /// Radius at the base and its growth along the whole length.
+    /// Radius at the base, and its growth along the whole length.
     radii: (f64, f64),
-    /// Unit normal of the segment, (along the axis, away from it).
+    /// Unit normal of the segment: (along the axis, away from it).
     normal: (f64, f64),
 }
 
 impl Profile {
-    /// Of a cone whose ends differ.
+    /// Computes the profile of a cone whose ends differ.
     pub fn new(cone: &Cone) -> Self {
         let axis = cone.apex.as_dvec3() - cone.base.as_dvec3();
         let length = axis.length();
@@ -119,7 +119,7 @@ impl Profile {
         Self { axis, length, radii: (r0, r1 - r0), normal: ((r0 - r1) / side, length / side) }
     }
 
-    /// Signed distance of the point `s` along the axis and `across` from it from the line through the segment.
+    /// Signed distance from the line through the segment, for the point `s` along the axis and `across` away from it.
     fn height_above(&self, s: f64, across: f64) -> f64 {
         (across - self.radii.0) * self.normal.1 + s * self.normal.0
     }
@@ -128,7 +128,7 @@ impl Profile {
         if self.length > 0.0 { (self.radii.0 + self.radii.1 * (s / self.length)).max(0.0) } else { self.radii.0 }
     }
 
-    /// Distance from the mantle of a point `s` along the axis and `across` from it, `across` ≥ 0.
+    /// Distance from the mantle, for a point `s` along the axis and `across` ≥ 0 away from it.
     pub fn distance(&self, s: f64, across: f64) -> f64 {
         let (ds, dr) = (self.length, self.radii.1);
         let (x, y) = (s, across - self.radii.0);

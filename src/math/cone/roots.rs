@@ -1,39 +1,39 @@
-//! Where a line meets the mantle: a quadratic whose coefficients and discriminant do not cancel.
+//! Intersections of a line with the mantle: a quadratic whose coefficients and discriminant do not cancel.
 //!
-//! With the unit axis a, half the length h/2, the mean radius r, the slope κ = (r₁ − r₀)/h and everything relative to
-//! the middle of the axis, the mantle is |p × a| = r + κ p·a with |p·a| ≤ h/2. The ray first moves to its point o next to
-//! the middle (as E. Haines, J. Günther, T. Akenine-Möller do for the sphere: *Precision Improvements for Ray/Sphere
-//! Intersection*, Ray Tracing Gems, 2019): seen from there every number is of the size of the cone. Then, with
+//! With the unit axis a, half the length h/2, the mean radius r, the slope κ = (r₁ − r₀)/h and everything relative to the
+//! middle of the axis, the mantle is |p × a| = r + κ p·a with |p·a| ≤ h/2. The ray first moves to its point o nearest to the
+//! middle (as E. Haines, J. Günther, T. Akenine-Möller do for the sphere: *Precision Improvements for Ray/Sphere
+//! Intersection*, Ray Tracing Gems, 2019): from there every number is of the size of the cone. Then, with
 //!
 //! > u = o × a, v = d × a, e = r + κ o·a, f = κ d·a:  A τ² + 2 B τ + C = 0, A = v² − f², B = u·v − e f, C = u² − e².
 //!
-//! B² − A C would lose everything where the line is nearly a tangent. By (o × a) × (d × a) = a (a · (o × d)) and
-//! |e v − f u|² = |r v + κ n⊥|², where n = d × o and n⊥ is the part of it across the axis, it is
+//! B² − A C would lose all digits where the line is nearly a tangent. By (o × a) × (d × a) = a (a · (o × d)) and |e v − f u|²
+//! = |r v + κ n⊥|², where n = d × o and n⊥ is its part perpendicular to the axis, it is
 //!
 //! > B² − A C = |r v + κ n⊥|² − g², g = o·v,
 //!
-//! for a cylinder r² v² − g²: g/|v| is the distance between the line and the axis. This only cancels at a tangent
-//! itself. The root of larger size in the numerator comes from q = −B ∓ √(B² − A C) as q/A, the other as C/q, which also
-//! holds for A = 0, a line parallel to the mantle.
+//! for a cylinder r² v² − g²: g/|v| is the distance between the line and the axis. This cancels only at a tangent itself.
+//! With q = −B ∓ √(B² − A C), signed so that it does not cancel, the roots are q/A and C/q, which also holds for A = 0, a
+//! line parallel to the mantle.
 
 use super::Cone;
 use crate::math::real::{Double, Real, Real3};
 use crate::math::shear::RaySpace;
 
-/// A distance from `f64` is good enough when its relative error is below this: 2 ulp of an `f32` at most.
+/// Largest relative error of an accepted distance from `f64`: at most 2 ulp of an `f32`.
 const GOOD: f64 = 2.0 * crate::math::bounds::U32 as f64;
 
-/// How far outside the sphere around the cone a point is not of the cone for certain, relative.
+/// Relative enlargement of the sphere around the cone outside which a point is certainly not on the cone.
 const OUTSIDE: f64 = 1.0 + 1.0 / 1024.0;
 
 /// One of the two roots.
 #[derive(Clone, Copy, Debug)]
 enum Root {
-    /// Not on the mantle.
+    /// The root is not on the mantle.
     Absent,
-    /// A hit, and a bound of the error of its distance.
+    /// A hit: its distance, and a bound of the error.
     At(f64, f64),
-    /// Cannot be told.
+    /// Undecided.
     Unsure,
 }
 
@@ -50,7 +50,7 @@ impl Root {
         matches!(self, Self::At(t, error) if t + error < 0.0)
     }
 
-    /// The last word: what cannot be told from 0 is 0.
+    /// Final distance: 0 if it cannot be told from 0.
     fn decided(self) -> f64 {
         match self {
             Self::At(t, error) if t.abs() <= error => 0.0,
@@ -63,7 +63,7 @@ impl Root {
 /// See [`super::distances`].
 pub(super) fn distances(ray: &RaySpace, cone: &Cone, ahead: bool) -> [f64; 2] {
     let first = solve::<f64>(ray, cone, false);
-    // Each root is decided apart, so that it does not depend on `ahead`.
+    // Each root is decided separately, so that it does not depend on `ahead`.
     if first.iter().all(|r| r.is_good() || (ahead && r.is_behind())) {
         return first.map(Root::decided);
     }
@@ -76,13 +76,13 @@ fn exact(ray: &RaySpace, cone: &Cone) -> [Root; 2] {
     solve::<Double>(ray, cone, true)
 }
 
-/// The power of two that brings `x` to 1..2. Exact for what `f32` can hold, and keeps every product in range.
+/// Power of two that brings `x` to 1..2. Exact for every `f32`, and keeps every product in range.
 fn scale(x: f64) -> f64 {
     const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
     f64::from_bits((2046 << 52) - (x.to_bits() & EXPONENT))
 }
 
-/// The root with the minus and the one with the plus, with running bounds of their errors.
+/// The roots with the minus and with the plus sign, with running bounds of their errors.
 ///
 /// A bound counts roundings of [`Real::UNIT`] to first order and rounds the counts up by half or more, which covers the
 /// rest and the rounding of the bounds. With `last`, nothing stays unsure: what may touch, touches.
@@ -104,7 +104,7 @@ fn solve<R: Real>(ray: &RaySpace, cone: &Cone, last: bool) -> [Root; 2] {
     let slope = (r1 - r0) / h;
     let r = (r0 + r1) * R::of(0.5);
 
-    // The ray, moved next to the middle: `shift` may be any number, o errs by `off`.
+    // The ray, moved next to the middle: `shift` may be inexact, o errs by `off`.
     let d = Real3::<R>::of(ray.dir.as_dvec3() * slow);
     let from = Real3::<R>::difference(ray.origin, cone.base).times(R::of(shrink)).minus(w.times(R::of(0.5)));
     let (direction, start) = (d.value(), from.value());
@@ -169,7 +169,7 @@ fn solve<R: Real>(ray: &RaySpace, cone: &Cone, last: bool) -> [Root; 2] {
     let larger = mantle.root(q, qa);
     // A double root, next to o: both are q/A.
     let smaller = if last && !q.is_certain() { larger } else { mantle.root(qc, q) };
-    // Which is which must not depend on the sign of a B that may be 0.
+    // The order must not depend on the sign of a B that may be 0.
     if forwards { [larger, smaller] } else { [smaller, larger] }
 }
 
@@ -185,25 +185,25 @@ impl<R: Real> Term<R> {
         self.value.value().abs()
     }
 
-    /// Whether it is known to half its size.
+    /// Whether the error is below half the size.
     fn is_certain(&self) -> bool {
         self.size() > 2.0 * self.error
     }
 }
 
-/// What decides whether a root lies on the mantle, and where on the ray.
+/// Data that decide whether a root lies on the mantle, and where on the ray.
 struct Mantle<R> {
-    /// Distance of o from the origin of the ray.
+    /// Distance of o from the ray's origin, along the ray.
     shift: f64,
     /// Roots beyond this are outside the sphere around the cone.
     limit: f64,
     /// Half the length of the axis, and its error.
     half: (f64, f64),
-    /// Place of o along the axis.
+    /// Position of o along the axis.
     along: (R, f64),
-    /// Growth of that along the ray.
+    /// Growth of that position along the ray.
     speed: (R, f64),
-    /// From scaled distances to the ray's own.
+    /// Factor from scaled distances to the ray's own.
     back: f64,
     last: bool,
 }
@@ -211,7 +211,7 @@ struct Mantle<R> {
 impl<R: Real> Mantle<R> {
     fn root(&self, over: Term<R>, under: Term<R>) -> Root {
         let (unit, unsure) = (R::UNIT, if self.last { Root::Absent } else { Root::Unsure });
-        // Far outside, also where the denominator may be 0.
+        // Far outside, even if the denominator may be 0.
         if over.size() - over.error > (under.size() + under.error) * self.limit {
             return Root::Absent;
         }

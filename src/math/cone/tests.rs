@@ -6,7 +6,7 @@ use dashu::integer::IBig;
 use dashu::rational::RBig;
 use proptest::prelude::*;
 
-/// Where the line meets the mantle, in rational numbers; `None` for a line in the mantle.
+/// Distances at which the line meets the mantle, in rational numbers; `None` for a line in the mantle.
 fn oracle(o: Vec3, d: Vec3, cone: &Cone) -> Option<Vec<RBig>> {
     let (o, d) = (point(o), point(d));
     let (base, apex) = (point(cone.base), point(cone.apex));
@@ -38,7 +38,7 @@ fn oracle(o: Vec3, d: Vec3, cone: &Cone) -> Option<Vec<RBig>> {
     Some(candidates.into_iter().filter(on_mantle).collect())
 }
 
-/// Panics unless all hits of the line are those of rational numbers; the largest error in ulp.
+/// Asserts that all hits of the line are those of rational arithmetic, and returns the largest error in ulp.
 fn assert_exact(o: Vec3, d: Vec3, cone: &Cone) -> f64 {
     let Some(ray) = RaySpace::new(o, d) else { return 0.0 };
     let got: Vec<f32> = intersect(&ray, cone, false).into_iter().filter(|t| !t.is_nan()).collect();
@@ -92,7 +92,7 @@ fn cone() -> impl Strategy<Value = Cone> {
     .prop_filter("both ends differ", |c| c.base != c.apex && c.base_radius.max(c.apex_radius) > 0.0)
 }
 
-/// Rays that graze, run along, start on or pass through what is hard, from near and far.
+/// Rays that graze, run along, start on or pass through difficult places, from near and far.
 fn aimed() -> impl Strategy<Value = (Vec3, Vec3, Cone)> {
     (cone(), vector(), vector(), 0.0f32..1.0, 0.0f32..6.3, 0..8u32, 0..4u32).prop_map(
         |(c, o, d, s, turn, kind, back)| {
@@ -185,7 +185,7 @@ fn a_tangent_touches_and_the_next_float_does_not() {
 fn a_line_in_the_mantle_does_not_hit_and_one_beside_it_may() {
     assert_eq!(hits([2.0, 0.0, -1.0], [0.0, 0.0, 1.0], &TUBE), NONE);
     assert_eq!(hits([2.0, 0.0, 0.0], [-0.5, 0.0, 1.0], &TIP), NONE);
-    // Parallel to the mantle, inside: out on the other side.
+    // Parallel to the mantle, inside: out through the other side.
     assert_eq!(hits([1.0, 0.0, 0.0], [0.5, 0.0, -1.0], &TIP), [-3.0]);
     assert_eq!(hits([1.0, 0.0, 0.0], [-0.5, 0.0, 1.0], &TIP), [3.0]);
 }
@@ -221,7 +221,7 @@ fn p9_thin_ones_far_away_and_wide_ones_nearby_are_within_8_ulp() {
             assert!(assert_exact(Vec3::new(0.0, s, 0.0), target, &cone) < 2.5);
         }
         for r in [1e5, 5e4, 0.0] {
-            // The wide ones pass by at 1e-2 and less.
+            // The wide cones pass at a distance of 1e-2 and less.
             let o = Vec3::new(-0.01 * s, 0.1 * s, 2.0 * s);
             let d = Vec3::new(1.0 - s, s * s, 0.3 - s);
             assert!(assert_exact(o, d, &wide(r)) < 2.5);
@@ -283,7 +283,7 @@ fn points_near_the_mantle_are_moved_onto_it_with_the_normal_outwards() {
     let out = DVec3::new(0.0, 2.0, 1.0).normalize();
     assert!((normal - out).length() < 1e-12, "{normal}");
     assert!((arm.y - (2.0 - arm.z / 2.0)).abs() < 1e-12 && (DVec3::new(0.0, 1.1, 2.0) - arm).length() < 0.1);
-    // Beyond the rim and on the axis: a point of the mantle all the same.
+    // Beyond the rim and on the axis, the projection is still a point of the mantle.
     let (rim, ..) = TIP.project(DVec3::new(0.0, 2.1, -0.1));
     assert!(rim.z == 0.0 && (rim.y - 2.0).abs() < 1e-12, "{rim}");
     let (tip, _, normal) = TIP.project(DVec3::new(0.0, 0.0, 4.0));

@@ -1,23 +1,23 @@
-//! Corners that can keep others from being ears, found by place.
+//! Spatial search for corners that can keep others from being ears.
 //!
 //! A face may have tens of thousands of corners, and a long thin ear may run beside all of them.
 
 use robust::{Coord, orient2d};
 
-/// Corners that were not convex, in a tree of boxes around halves of them.
+/// Corners that are not convex, in a binary tree of boxes.
 #[derive(Debug, Default)]
 pub(super) struct Blockers {
-    /// In the order of the leaves.
+    /// Corners in the order of the leaves.
     corners: Vec<u32>,
-    /// Least and greatest coordinates of each part; those of the halves of part k are at 2k + 1 and 2k + 2.
+    /// Smallest and largest coordinates of each node; the children of node k are 2k + 1 and 2k + 2.
     boxes: Vec<[Coord<f64>; 2]>,
 }
 
 impl Blockers {
-    /// Corners of a part that is not halved.
+    /// Largest number of corners in a leaf.
     const LEAF: usize = 8;
 
-    /// Takes these corners in the place of those it has.
+    /// Replaces all corners by these.
     pub(super) fn fill(&mut self, corners: impl Iterator<Item = u32>, flat: &[Coord<f64>]) {
         self.corners.clear();
         self.corners.extend(corners);
@@ -42,7 +42,7 @@ impl Blockers {
     }
 }
 
-/// Orders corners so that each half of a part has its own side of it, and notes the boxes of parts that are halved.
+/// Partitions the corners recursively in space, and stores the boxes of the inner nodes.
 fn halve(corners: &mut [u32], k: usize, flat: &[Coord<f64>], boxes: &mut Vec<[Coord<f64>; 2]>) {
     if corners.len() <= Blockers::LEAF {
         return;
@@ -65,14 +65,14 @@ fn halve(corners: &mut [u32], k: usize, flat: &[Coord<f64>], boxes: &mut Vec<[Co
     halve(second, 2 * k + 2, flat, boxes);
 }
 
-/// Whether all of a box lies beside that of a counter-clockwise triangle, or on the outer side of one of its edges.
+/// Whether a box is disjoint from the box of a counter-clockwise triangle, or lies outside one of its edges.
 fn is_outside([lo, hi]: &[Coord<f64>; 2], [a, b, c]: [Coord<f64>; 3]) -> bool {
     let is_beside = |lo: f64, hi: f64, [a, b, c]: [f64; 3]| hi < a.min(b).min(c) || lo > a.max(b).max(c);
     if is_beside(lo.x, hi.x, [a.x, b.x, c.x]) || is_beside(lo.y, hi.y, [a.y, b.y, c.y]) {
         return true;
     }
     let is_right_of = |from: Coord<f64>, to: Coord<f64>| {
-        // The corner of the box that is farthest to the left.
+        // Corner of the box that is farthest to the left of the edge.
         let x = if to.y > from.y { lo.x } else { hi.x };
         let y = if to.x > from.x { hi.y } else { lo.y };
         orient2d(from, to, Coord { x, y }) < 0.0
@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn whatever_lies_in_a_triangle_is_asked() {
         let mut random = Random::new(3);
-        // On a grid, so that many lie on edges and in the place of others.
+        // On a grid, so that many corners lie on edges or coincide.
         let mut place = || Coord { x: random.below(12) as f64, y: random.below(9) as f64 };
         let flat: Vec<Coord<f64>> = (0..300).map(|_| place()).collect();
         let mut blockers = Blockers::default();

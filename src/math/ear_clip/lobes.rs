@@ -1,13 +1,13 @@
-//! Parts of a polygon that touches itself in corners: what lies between two visits of a place is a ring of its own.
+//! Lobes of a polygon that touches itself in corners: the corners between two visits of a point form a ring of their own.
 
 use robust::Coord;
 use std::collections::HashMap;
 
-/// The rings that a ring of corners falls into, cut where it comes back to a place and what it went around since, as well
-/// as all that is left, has area: counter-clockwise like the whole. A way around a hole is none, and stays in its ring.
+/// Splits a ring of corners where it returns to a point, if both the loop since the first visit and all the rest have
+/// positive area, counter-clockwise like the whole. A loop around a hole does not, and stays in its ring.
 pub(super) fn lobes(flat: &[Coord<f64>], ring: &[u32]) -> Vec<Vec<u32>> {
     let Some(first) = ring.first().map(|&i| flat[i as usize]) else { return Vec::new() };
-    // Relative to one corner, so that far coordinates do not cancel.
+    // Relative to one corner, so that distant coordinates do not cancel.
     let at = |i: u32| (flat[i as usize].x - first.x, flat[i as usize].y - first.y);
     let cross = |i: u32, j: u32| {
         let ((ax, ay), (bx, by)) = (at(i), at(j));
@@ -17,7 +17,7 @@ pub(super) fn lobes(flat: &[Coord<f64>], ring: &[u32]) -> Vec<Vec<u32>> {
     let last = ring.last().map_or(0.0, |&last| cross(last, ring[0]));
     let mut left = last + ring.windows(2).map(|w| cross(w[0], w[1])).sum::<f64>();
 
-    // The way so far, and twice the area that it has swept up to each corner.
+    // The current path, and twice the area that it has swept up to each corner.
     let (mut way, mut swept): (Vec<u32>, Vec<f64>) = (Vec::new(), Vec::new());
     let (mut visited, mut rings) = (HashMap::new(), Vec::new());
     for &corner in ring {

@@ -3,15 +3,14 @@
 //! G. H. Meisters, "Polygons Have Ears", 1975; signs by J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic
 //! and Fast Robust Geometric Predicates", 1997 (the crate `robust`).
 //!
-//! The polygon is seen along the axis of its Newell normal's largest component. An ear is cut only where no other
-//! corner lies in it or on its diagonal, so corners on straight runs stay corners of some triangle and no T-junction
-//! arises. A polygon with n corners whose boundary does not cross itself, bridges to holes included, gives n − 2
-//! triangles of positive area. Spikes that stick out are dropped first. A polygon that touches itself in corners falls into
-//! parts there that are cut one by one (`lobes`). Where no ear is left, three fallbacks follow:
-//! straight corners are cut off with triangles of no area; a quad that crosses itself is cut along its shorter diagonal
-//! like every warped quad; a larger polygon that crosses itself loses its first convex corner whatever lies inside;
-//! after [`MAX_FORCED`] of those the rest becomes a fan. Every corner is still used, what is covered twice or lost
-//! there is undefined.
+//! The polygon is projected along the axis of its Newell normal's largest component. An ear is cut only where no other corner
+//! lies in it or on its diagonal, so corners on straight runs stay corners of some triangle and no T-junction arises. A
+//! polygon with n corners whose boundary does not cross itself, bridges to holes included, gives n − 2 triangles of positive
+//! area. Spikes that stick out are dropped first. A polygon that touches itself in corners is split there into parts that are
+//! cut one by one (`lobes`). Where no ear is left, three fallbacks follow: straight corners are cut off with triangles of no
+//! area; a quad that crosses itself is cut along its shorter diagonal like every warped quad; a larger polygon that crosses
+//! itself loses its first convex corner whatever lies inside; after [`MAX_FORCED`] of those the rest becomes a fan. Every
+//! corner is still used; which parts are covered twice or lost there is undefined.
 
 mod blockers;
 mod lobes;
@@ -21,51 +20,51 @@ use blockers::Blockers;
 use robust::{Coord, orient2d};
 use std::collections::VecDeque;
 
-/// Corners cut off by force before a polygon that crosses itself is finished as a fan; bounds the time.
+/// Corners cut off by force before a self-crossing polygon is finished as a fan; bounds the time.
 pub const MAX_FORCED: u32 = 64;
 
-/// What kind of polygon it turned out to be.
+/// Kind of the polygon, as found by cutting it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Every triangle is an ear: the boundary does not cross itself.
+    /// The boundary does not cross itself: every triangle is an ear.
     Exact,
-    /// It has spikes or no area: some triangles have no area.
+    /// The polygon has spikes or no area: some triangles have no area.
     Degenerate,
-    /// It crosses itself: the triangles are a guess.
+    /// The polygon crosses itself: the triangles are a guess.
     Crossing,
 }
 
-/// Twice the area of the polygon along its mean normal (M. Newell), counter-clockwise positive; zero when it has none.
+/// Twice the area vector of the polygon (M. Newell), towards the side from which it is counter-clockwise; zero without area.
 pub fn newell(points: &[DVec3]) -> DVec3 {
     let Some((&first, &last)) = points.first().zip(points.last()) else { return DVec3::ZERO };
-    // Relative to one corner, so that far coordinates do not cancel.
+    // Relative to one corner, so that distant coordinates do not cancel.
     let cross = |a: DVec3, b: DVec3| (a - first).cross(b - first);
     points.windows(2).map(|w| cross(w[0], w[1])).sum::<DVec3>() + cross(last, first)
 }
 
-/// The cutter; keeps its buffers from polygon to polygon.
+/// Ear clipper; reuses its buffers for every polygon.
 #[derive(Debug, Default)]
 pub struct EarClipper {
     flat: Vec<Coord<f64>>,
-    /// The corners that are cut now, by number: what the other lists say of others is of no account.
+    /// Indices of the corners being cut; entries of the other lists for other corners are meaningless.
     ring: Vec<u32>,
     prev: Vec<u32>,
     next: Vec<u32>,
-    /// Whether a corner is strictly convex; others can block ears.
+    /// Whether a corner is strictly convex; other corners can block ears.
     convex: Vec<bool>,
     alive: Vec<bool>,
     blockers: Blockers,
-    /// Corners to look at, with the value of `ticket` that makes the entry valid.
+    /// Corners to examine, each with the value of `ticket` that makes the entry valid.
     queue: VecDeque<(u32, u32)>,
     ticket: Vec<u32>,
     left: usize,
 }
 
 impl EarClipper {
-    /// Appends triangles of corner numbers of `points` to `out`, wound as the polygon is.
+    /// Appends triangles, as corner indices into `points`, to `out`, with the orientation of the polygon.
     ///
-    /// Coordinates must be finite. Corners equal to the one before them are left out; triangles with two equal corners
-    /// are never made.
+    /// Coordinates must be finite. Corners equal to the previous one are left out; triangles with two equal corners are never
+    /// made.
     pub fn cut(&mut self, points: &[DVec3], out: &mut Vec<[u32; 3]>) -> Outcome {
         let ring = distinct_neighbours(points);
         match ring.len() {
@@ -81,8 +80,8 @@ impl EarClipper {
                 if outcome != Outcome::Crossing {
                     return outcome;
                 }
-                // A warped face may cross itself seen along an axis and not along its normal. There coordinates are
-                // rounded, which bends straight runs, but a warped face has none.
+                // The projection of a warped face along an axis may cross itself where that along its normal does not. Its
+                // coordinates are rounded, which bends straight runs, but a warped face has none.
                 let (first, second) = normal.normalize().any_orthonormal_pair();
                 let first_try = out.split_off(start);
                 let along_normal = |p: DVec3| Coord { x: p.dot(first), y: p.dot(second) };
@@ -99,7 +98,7 @@ impl EarClipper {
         }
     }
 
-    /// Cuts the polygon as it looks from one side.
+    /// Cuts the polygon as projected by `see`.
     fn cut_seen(
         &mut self,
         points: &[DVec3],
@@ -125,8 +124,8 @@ impl EarClipper {
         }
     }
 
-    /// Cuts what touches itself in corners alone, part by part, instead of what was appended from `start` on. `None`, and
-    /// nothing is changed, where it does not, or a part crosses itself.
+    /// Cuts a polygon that only touches itself in corners, part by part, and replaces the triangles appended from `start` on.
+    /// `None`, with nothing changed, if it does not touch itself, or a part crosses itself.
     fn cut_lobes(&mut self, ring: &[u32], start: usize, out: &mut Vec<[u32; 3]>) -> Option<Outcome> {
         let rings = lobes::lobes(&self.flat, ring);
         if rings.len() < 2 {
@@ -149,7 +148,7 @@ impl EarClipper {
         let mut outcome = Outcome::Exact;
         let mut forced = 0;
         loop {
-            // Cut ears until none is left that a neighbour's ear has not disturbed, then look at every corner once.
+            // Cut queued ears, then examine every remaining corner once.
             self.clip_queued(out);
             if self.left <= 3 {
                 return self.finish(outcome, out);
@@ -174,7 +173,7 @@ impl EarClipper {
         }
     }
 
-    /// Makes the linked ring and the list of blockers.
+    /// Builds the linked ring and the list of blockers.
     fn link(&mut self, ring: &[u32]) {
         // Not cleared: a polygon may fall into very many parts.
         let n = self.flat.len();
@@ -204,7 +203,7 @@ impl EarClipper {
         self.queue_all();
     }
 
-    /// Takes out tips whose two neighbours are in one place, unless they point into the polygon (a slit).
+    /// Removes tips whose two neighbours coincide, unless they point into the polygon (a slit).
     fn drop_antennas(&mut self, ring: &[u32]) {
         for &start in ring {
             let mut tip = start;
@@ -225,7 +224,7 @@ impl EarClipper {
         }
     }
 
-    /// Whether the tip of a spike lies in the angle at its foot that is inside the polygon.
+    /// Whether the tip of a spike points into the interior angle at its foot.
     fn points_inwards(&self, tip: u32) -> bool {
         let foot = self.prev[tip as usize];
         let (before, after) = (self.prev[foot as usize], self.next[self.next[tip as usize] as usize]);
@@ -260,7 +259,7 @@ impl EarClipper {
         self.queue.push_back((i, self.ticket[i as usize]));
     }
 
-    /// Cuts every ear the queue leads to; whether there was one.
+    /// Cuts every ear the queue leads to, and returns whether there was one.
     ///
     /// The neighbours of a cut ear go to the end of the queue, which keeps triangles from becoming a fan of slivers.
     fn clip_queued(&mut self, out: &mut Vec<[u32; 3]>) -> bool {
@@ -283,8 +282,8 @@ impl EarClipper {
         !self.blockers.any(triangle, blocks)
     }
 
-    /// Whether corner q lies in the closed triangle, but not in the place of one of its corners (the two sides of a
-    /// bridge to a hole share places).
+    /// Whether corner q lies in the closed triangle, but does not coincide with one of its corners (the two sides of a bridge
+    /// to a hole share positions).
     fn blocks(&self, q: u32, [a, b, c]: [u32; 3]) -> bool {
         let same_place = |i: u32| self.flat[i as usize] == self.flat[q as usize];
         self.sign(a, b, q) >= 0.0
@@ -293,7 +292,7 @@ impl EarClipper {
             && !(same_place(a) || same_place(b) || same_place(c))
     }
 
-    /// Takes corner i out of the ring and makes its triangle, unless two of its corners are in one place.
+    /// Removes corner i from the ring and emits its triangle, unless two of its corners coincide.
     fn remove(&mut self, i: u32, out: &mut Vec<[u32; 3]>) {
         let (p, n) = (self.prev[i as usize], self.next[i as usize]);
         self.emit([p, i, n], out);
@@ -314,7 +313,7 @@ impl EarClipper {
         }
     }
 
-    /// Takes every straight corner and spike out of the ring; whether there was one.
+    /// Removes every straight corner and spike from the ring, and returns whether there was one.
     fn clip_straight(&mut self, out: &mut Vec<[u32; 3]>) -> bool {
         let before = self.left;
         for k in 0..self.ring.len() {
@@ -326,12 +325,12 @@ impl EarClipper {
         self.left < before
     }
 
-    /// The first corner left that is as wanted.
+    /// First remaining corner that satisfies `wanted`.
     fn first(&self, wanted: impl Fn(&Self, u32) -> bool) -> Option<u32> {
         self.ring.iter().copied().find(|&i| self.alive[i as usize] && wanted(self, i))
     }
 
-    /// The last triangle.
+    /// Emits the last triangle, and returns the final outcome.
     fn finish(&self, outcome: Outcome, out: &mut Vec<[u32; 3]>) -> Outcome {
         let Some(i) = self.first(|_, _| true) else { return outcome };
         self.emit([self.prev[i as usize], i, self.next[i as usize]], out);
@@ -342,7 +341,7 @@ impl EarClipper {
         }
     }
 
-    /// What is left of a hopeless polygon.
+    /// Cuts the rest of a hopeless polygon as a fan.
     fn fan(&self, out: &mut Vec<[u32; 3]>) -> Outcome {
         if let Some(apex) = self.first(|_, _| true) {
             let mut i = self.next[apex as usize];
@@ -356,7 +355,7 @@ impl EarClipper {
 }
 
 impl Outcome {
-    /// The worse of both.
+    /// The worse of two outcomes.
     fn max(self, other: Self) -> Self {
         match (self, other) {
             (Self::Crossing, _) | (_, Self::Crossing) => Self::Crossing,
@@ -366,7 +365,7 @@ impl Outcome {
     }
 }
 
-/// Corner numbers without those in the place of the corner before them.
+/// Indices of the corners that differ from the previous one.
 fn distinct_neighbours(points: &[DVec3]) -> Vec<u32> {
     let before = points.iter().cycle().skip(points.len().saturating_sub(1));
     #[expect(clippy::cast_possible_truncation, reason = "corner numbers are u32")]
@@ -374,8 +373,8 @@ fn distinct_neighbours(points: &[DVec3]) -> Vec<u32> {
     distinct.collect()
 }
 
-/// The Newell normal; where loops cancel each other, that of the largest corner triangle; for a straight polygon the
-/// axis along which it is shortest.
+/// Newell normal; if loops cancel each other, the normal of the largest corner triangle; for a straight polygon the axis
+/// along which it is shortest.
 fn any_normal(points: &[DVec3]) -> DVec3 {
     let normal = newell(points);
     if normal != DVec3::ZERO {
@@ -396,7 +395,7 @@ fn any_normal(points: &[DVec3]) -> DVec3 {
     })
 }
 
-/// Drops the axis of the normal's largest component, so that counter-clockwise stays counter-clockwise.
+/// Drops the axis of the normal's largest component; counter-clockwise stays counter-clockwise.
 fn project(p: DVec3, normal: DVec3) -> Coord<f64> {
     let size = normal.abs();
     let (x, y, towards) = if size.x >= size.y && size.x >= size.z {
@@ -409,7 +408,7 @@ fn project(p: DVec3, normal: DVec3) -> Coord<f64> {
     if towards < 0.0 { Coord { x: y, y: x } } else { Coord { x, y } }
 }
 
-/// A strictly convex quad is cut along its shorter diagonal; at equal length along the one from its first corner.
+/// Cuts a strictly convex quad along its shorter diagonal; at equal length along the one from its first corner.
 fn convex_quad(flat: &[Coord<f64>], points: &[DVec3], ring: &[u32]) -> Option<[[u32; 3]; 2]> {
     let &[a, b, c, d] = ring else { return None };
     let at = |i: u32| flat[i as usize];

@@ -1,4 +1,4 @@
-//! Polygons by hand and at random.
+//! Hand-made and random polygons.
 
 use super::*;
 use proptest::prelude::*;
@@ -19,8 +19,8 @@ fn area2(points: &[DVec3], t: [u32; 3]) -> f64 {
     (b - a).cross(c - a).z
 }
 
-/// Exact for small integers: all areas positive, their sum the polygon's, n − 2 triangles, every side of the
-/// polygon the side of exactly one triangle, every other side shared by two.
+/// Asserts an exact result, for small integers: all areas positive, their sum the polygon's, n − 2 triangles, every side of
+/// the polygon a side of exactly one triangle, every other side shared by two.
 fn assert_exact(points: &[DVec3]) {
     let (triangles, outcome) = cut(points);
     assert_eq!(outcome, Outcome::Exact, "{points:?}");
@@ -67,7 +67,7 @@ fn a_comb_of_many_teeth_is_cut_in_little_time() {
 fn a_hole_joined_by_a_bridge_stays_open() {
     let square = [(0, 0), (6, 0), (6, 6), (0, 6), (0, 0), (2, 2), (2, 4), (4, 4), (4, 2), (2, 2)];
     assert_exact(&plane(&square));
-    // The bridge may touch the hole's ring anywhere, and two holes may share the place of one corner.
+    // The bridge may touch the hole's ring anywhere, and two holes may share the position of one corner.
     let two = [
         (0, 0),
         (9, 0),
@@ -201,8 +201,8 @@ fn a_polygon_that_goes_round_a_triangle_very_often_is_cut_in_little_time() {
 }
 
 proptest! {
-    /// Corners sorted around the origin make a polygon that does not cross itself; straight runs are frequent on
-    /// so coarse a lattice.
+    /// Corners sorted around the origin make a polygon that does not cross itself; straight runs are frequent on such a
+    /// coarse lattice.
     #[test]
     fn polygons_around_a_point_are_cut_exactly(corners in prop::collection::vec((-6i32..7, -6i32..7), 3..40)) {
         let mut by_angle: Vec<(i32, i32)> = corners.into_iter().filter(|&c| c != (0, 0)).collect();

@@ -1,5 +1,5 @@
-//! Where rays meet triangles that they hit: [`meet`](super::triangle::meet) and
-//! [`barycentrics_at`](super::triangle::barycentrics_at) in lanes, operation by operation; of rays that each have a triangle
+//! Intersections of rays with triangles that they hit: [`meet`](super::triangle::meet) and
+//! [`barycentrics_at`](super::triangle::barycentrics_at) in lanes, operation by operation; for rays that each have a triangle
 //! of their own ([`meet`]), or that share one ([`Plane`]).
 
 mod plane;
@@ -15,34 +15,34 @@ use super::triangles::Corners8;
 use quotients::{Quotients, SURE, clamped, quotient};
 use vectors::Vectors;
 
-/// Rays and triangles, by axis and lane.
+/// Rays and the triangles they hit, by axis and lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Pairs {
-    /// Where the rays start.
+    /// Origins of the rays.
     pub origin: [Row; 3],
-    /// Their directions.
+    /// Directions of the rays.
     pub dir: [Row; 3],
-    /// The triangle that each of them hits.
+    /// The triangle that each ray hits.
     pub corners: Corners8,
 }
 
-/// Where they meet.
+/// Intersections of rays with triangles.
 #[derive(Clone, Copy, Debug)]
 pub struct Meetings<L> {
     /// Exact t, rounded once.
     pub t: L,
-    /// Weights of the second and third corner.
+    /// Barycentric weights of the second and third corner.
     pub weights: [L; 2],
-    /// The lanes in which that is certain; for the others the scalar form must be asked.
+    /// Bit mask of the lanes in which the results are certain; the others need the scalar form.
     pub sure: u32,
 }
 
 impl Pairs {
-    /// No rays.
+    /// No rays and no triangles.
     pub const EMPTY: Self =
         Self { origin: [[0.0; LANES]; 3], dir: [[0.0; LANES]; 3], corners: super::triangles::NO_CORNERS };
 
-    /// Where each ray meets its triangle.
+    /// Intersects each ray with its triangle.
     #[inline(always)]
     pub fn meet<S: Simd>(&self, s: S) -> Meetings<Row> {
         let [a, b, c] = &self.corners;
@@ -52,13 +52,13 @@ impl Pairs {
     }
 }
 
-/// Three rows from memory.
+/// Loads three rows.
 #[inline(always)]
 fn loaded<S: Lanewise<N>, const N: usize>(s: S, [x, y, z]: &[[f32; N]; 3]) -> [S::Lanes; 3] {
     [s.load(x), s.load(y), s.load(z)]
 }
 
-/// Where rays meet their triangles; origins, directions and corners by axis.
+/// Intersects rays with their triangles; origins, directions and corners by axis.
 #[inline(always)]
 pub fn meet<S: Lanewise<N>, const N: usize>(
     s: S,
@@ -78,7 +78,7 @@ pub fn meet<S: Lanewise<N>, const N: usize>(
     Meetings { t: rounded, weights: weights(s, [&o, &d, &a], [&e1, &e2], &normal, value), sure }
 }
 
-/// What numerators and denominators must be larger than: [`SURE`] of the sums of the sizes of their terms.
+/// Lower bounds for certain numerators and denominators: [`SURE`] times the sums of the sizes of their terms.
 #[inline(always)]
 fn term_bounds<S: Lanewise<N>, const N: usize>(
     s: S,
@@ -97,7 +97,7 @@ fn term_bounds<S: Lanewise<N>, const N: usize>(
     [s.mul_add(sum(s, sizes, from), sure, least), s.mul_add(sum(s, sizes, along), sure, least)]
 }
 
-/// How far places are apart, by axis.
+/// Absolute differences, by axis.
 #[inline(always)]
 fn apart<S: Lanewise<N>, const N: usize>(s: S, p: [S::Lanes; 3], q: [S::Lanes; 3]) -> [S::Lanes; 3] {
     [s.abs(s.sub(p[0], q[0])), s.abs(s.sub(p[1], q[1])), s.abs(s.sub(p[2], q[2]))]
@@ -109,8 +109,8 @@ fn sum<S: Lanewise<N>, const N: usize>(s: S, p: [S::Lanes; 3], q: [S::Lanes; 3])
     s.mul_add(p[0], q[0], s.mul_add(p[1], q[1], s.mul(p[2], q[2])))
 }
 
-/// Weights of the second and third corner: areas seen along the axis from which they are largest. Each is a component of a
-/// cross product over that of the normal.
+/// Barycentric weights of the second and third corner: areas in the projection along the axis in which they are largest. Each
+/// is a component of a cross product over that of the normal.
 #[inline(always)]
 fn weights<S: Lanewise<N>, const N: usize>(
     s: S,

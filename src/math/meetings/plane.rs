@@ -1,4 +1,4 @@
-//! Rays that share a triangle: what its plane gives them all is found once.
+//! Rays that share a triangle: the data of its plane are computed once.
 
 use super::super::simd::Lanewise;
 use super::super::triangle::{flat_axes, magnitude_cross};
@@ -6,20 +6,20 @@ use super::super::{DVec3, Vec3};
 use super::Meetings;
 use super::quotients::{Quotients, SURE, clamped, quotient};
 
-/// What bounds the rays of a row.
+/// Bounds of the rays of a row.
 #[derive(Clone, Copy, Debug)]
 pub struct RowBounds {
-    /// The least of all origins, by axis.
+    /// Smallest origin, by axis.
     pub low: DVec3,
-    /// The largest of all origins, by axis.
+    /// Largest origin, by axis.
     pub high: DVec3,
-    /// The origin, where all rays have the same.
+    /// Common origin, if all rays share one.
     pub from: Option<DVec3>,
-    /// No component of a direction is larger in size.
+    /// Largest absolute component of a direction.
     pub dir: f64,
 }
 
-/// What the rays of a row share when they meet a triangle.
+/// Plane of a triangle that the rays of a row share.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane {
     corners: [DVec3; 3],
@@ -28,7 +28,7 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// The plane of a triangle.
+    /// Computes the plane of a triangle.
     #[inline(always)]
     pub fn of(triangle: &[Vec3; 3]) -> Self {
         let corners = [triangle[0].as_dvec3(), triangle[1].as_dvec3(), triangle[2].as_dvec3()];
@@ -36,7 +36,7 @@ impl Plane {
         Self { corners, normal: e1.cross(e2), sizes: magnitude_cross(e1.abs(), e2.abs()) }
     }
 
-    /// Where rays (by axis and lane) meet it.
+    /// Intersects rays (by axis and lane) with the triangle.
     #[inline(always)]
     pub fn meet<S: Lanewise<N>, const N: usize>(
         &self,
@@ -59,7 +59,7 @@ impl Plane {
         };
         let d = [s.widen(s.load(&dir[0])), s.widen(s.load(&dir[1])), s.widen(s.load(&dir[2]))];
         let denominator = self.dot(s, d);
-        // Those of the farthest and of the steepest ray there could be.
+        // Bounds for the farthest and the steepest possible ray.
         let n_bound = s.splat_f64(self.sizes.dot(low.max(high)) * f64::from(SURE));
         let d_bound = s.splat_f64(self.sizes.element_sum() * bounds.dir * f64::from(SURE));
         let Quotients { rounded, value, sure } = quotient(s, [numerator, n_bound], [denominator, d_bound]);
@@ -76,7 +76,8 @@ impl Plane {
         )
     }
 
-    /// Weights of the second and third corner: [`barycentrics_at`](super::super::triangle::barycentrics_at) in lanes.
+    /// Barycentric weights of the second and third corner: [`barycentrics_at`](super::super::triangle::barycentrics_at) in
+    /// lanes.
     #[inline(always)]
     fn barycentrics<S: Lanewise<N>, const N: usize>(
         &self,
@@ -96,7 +97,7 @@ impl Plane {
         clamped(s, s.mul_f64(u, scale), s.mul_f64(v, scale))
     }
 
-    /// Coordinate `k` of the places at `t`, relative to the first corner.
+    /// Coordinate `k` of the points at `t`, relative to the first corner.
     #[inline(always)]
     fn along<S: Lanewise<N>, const N: usize>(
         &self,

@@ -1,4 +1,4 @@
-//! Meetings in lanes are those of the scalar form.
+//! Intersections in lanes equal those of the scalar form.
 
 use super::*;
 use crate::math::random::Random;
@@ -10,7 +10,7 @@ use crate::math::triangle::{self, Triangle};
 use crate::math::triangles::{NO_CORNERS, Verdicts, set_corners};
 use crate::math::{DVec3, Vec3};
 
-/// Eight rays against a triangle: the verdicts, and where they meet its plane.
+/// Eight rays against a triangle: the verdicts, and the intersections with its plane.
 struct Row8<'a>(&'a [RaySpace; LANES], &'a Triangle, Option<Vec3>);
 
 impl Kernel for Row8<'_> {
@@ -59,7 +59,7 @@ fn eight_rays_side_by_side_meet_a_triangle_as_each_does_alone() {
         if rays.iter().any(|r| r.z != rays[0].z) {
             continue;
         }
-        // All start there, whether the row knows it or not.
+        // All rays start there, whether the row is told so or not.
         for (level, from) in Level::all().into_iter().flat_map(|l| [(l, None), (l, Some(origin))]) {
             let (verdicts, met) = level.run(Row8(&rays, &triangle, from));
             let [u, v] = met.weights;
@@ -98,18 +98,18 @@ fn set(pairs: &mut Pairs, lane: usize, ray: &RaySpace, triangle: &Triangle) {
     set_corners(&mut pairs.corners, lane, triangle);
 }
 
-/// What a ray and a triangle are like.
+/// Configuration of a ray and a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Ordinary,
     /// The ray runs nearly in the triangle's plane.
     Grazing,
-    /// It starts many sizes away.
+    /// The ray starts many sizes away.
     Far,
     Tiny,
-    /// It starts next to the triangle, or on it.
+    /// The ray starts next to the triangle, or on it.
     Near,
-    /// It meets the triangle at a corner, or at an edge.
+    /// The ray hits the triangle at a corner or an edge.
     Edge,
 }
 
@@ -134,7 +134,7 @@ fn pair(random: &mut Random, kind: Kind) -> (Vec3, Vec3, Triangle) {
     (target - away, away * (0.1 + random.unit()), triangle)
 }
 
-/// A ray of this kind that hits its triangle.
+/// Generates a ray of this kind that hits its triangle.
 fn hit(random: &mut Random, kind: Kind) -> (RaySpace, Triangle) {
     loop {
         let (origin, dir, triangle) = pair(random, kind);
@@ -173,7 +173,7 @@ fn eight_rays_meet_eight_triangles_as_each_does_alone() {
     }
 }
 
-/// Sixteen rays, those of two eights.
+/// Sixteen rays, made from two pairs of eight.
 struct MeetWide<'a>([&'a Pairs; 2]);
 
 impl Kernel for MeetWide<'_> {
@@ -224,7 +224,7 @@ fn weights_are_seen_along_every_axis() {
     for axis in 0..3 {
         let mut squash = Vec3::ONE;
         squash[axis] = 0.0;
-        // Also where two components of the normal are equally large.
+        // Also with two equally large components of the normal.
         for slope in [0.0, 0.5, 1.0, -1.0] {
             let mut slanted = |scale: f32| {
                 let mut p = random.cube() * squash * scale;

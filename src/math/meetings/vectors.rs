@@ -39,7 +39,7 @@ impl<S: Lanewise<N>, const N: usize> Vectors<S, N> {
         ])
     }
 
-    /// Turned so that an axis comes last: the first in the lanes of the first mask, the second in those of the other.
+    /// Rotates the axes so that x comes last in the lanes of the first mask, y in those of the second, and z elsewhere.
     #[inline(always)]
     pub(super) fn turned(&self, s: S, [along_x, along_y]: [u32; 2]) -> [S::Doubles; 3] {
         let [x, y, z] = self.0;

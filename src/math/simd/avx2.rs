@@ -1,7 +1,7 @@
 //! Eight lanes in one 256-bit register of x86-64.
 //!
-//! Invariant of every `unsafe` here: the method has an [`Avx2`] token, tokens come from [`Avx2::detect`] alone, and that
-//! gives one only on processors with the instructions.
+//! Invariant of every `unsafe` here: the method has an [`Avx2`] token, tokens come only from [`Avx2::detect`], and that
+//! returns one only on processors with the instructions.
 
 #![expect(unsafe_code, reason = "instructions of one processor family, guarded by a token; see the module's invariant")]
 
@@ -15,7 +15,7 @@ use super::{Axis, Kernel, LANES, Lanewise, LineOnStack, MIDDLE, NEAR_MIDDLE, Ord
 pub(super) struct Avx2(());
 
 impl Avx2 {
-    /// A token if the processor has what [`Self::run`] compiles for.
+    /// Returns a token if the processor has the features that [`Self::run`] compiles for.
     pub(super) fn detect() -> Option<Self> {
         let has = is_x86_feature_detected!("avx2")
             && is_x86_feature_detected!("fma")
@@ -63,7 +63,7 @@ impl Avx2 {
     }
 }
 
-/// Eight lanes for a token that proves AVX2.
+/// Implements eight lanes for a token that proves AVX2.
 macro_rules! eight_lanes {
     ($token:ty, $wide:ty, $widened:expr, $larger:expr, $broad_fits:expr) => {
         impl Lanewise<LANES> for $token {
@@ -518,7 +518,7 @@ fn larger(s: Avx2, a: __m256, b: __m256) -> __m256 {
     s.greater(s.abs(a), s.abs(b))
 }
 
-/// All bits of the lanes of a mask.
+/// Expands a mask to lanes of all ones or zeros.
 #[inline(always)]
 pub(super) fn lanes_in(mask: u32) -> __m256i {
     // SAFETY: only called where a token proves the features.
@@ -528,7 +528,7 @@ pub(super) fn lanes_in(mask: u32) -> __m256i {
     }
 }
 
-/// Each four bits as a word, of which the lowest three count.
+/// Expands each four bits to a word, of which the lowest three bits count.
 #[inline(always)]
 pub(super) fn lanes_of(order: Order) -> __m256i {
     // SAFETY: only called where a token proves the features.

@@ -1,7 +1,7 @@
 //! Sixteen lanes in one 512-bit register of x86-64, and eight in half of one.
 //!
-//! Invariant of every `unsafe` here: the method has an [`Avx512`] token, tokens come from [`Avx512::detect`] alone, and
-//! that gives one only on processors with the instructions.
+//! Invariant of every `unsafe` here: the method has an [`Avx512`] token, tokens come only from [`Avx512::detect`], and that
+//! returns one only on processors with the instructions.
 
 #![expect(unsafe_code, reason = "instructions of one processor family, guarded by a token; see the module's invariant")]
 
@@ -11,16 +11,16 @@ use super::avx2::{Avx2, eight_lanes, lanes_in, lanes_of};
 use super::pair::Pair;
 use super::{Axis, Kernel, LANES, Lanewise, LineOnStack, MIDDLE, NEAR_MIDDLE, Order, Pick, Row, Simd, WIDE};
 
-/// Proof that the processor has AVX-512 with 256-bit forms, double words and quad words, and what AVX2 came with.
+/// Proof that the processor has AVX-512 F, VL, DQ and BW, and all of [`Avx2`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Avx512(Avx2);
 
-/// Proof that AVX-512 is there, for sixteen lanes.
+/// Proof of AVX-512, for sixteen lanes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sixteen(Avx512);
 
 impl Avx512 {
-    /// A token if the processor has what [`Self::run`] compiles for.
+    /// Returns a token if the processor has the features that [`Self::run`] compiles for.
     pub(super) fn detect() -> Option<Self> {
         let has = is_x86_feature_detected!("avx512f")
             && is_x86_feature_detected!("avx512vl")
@@ -29,7 +29,7 @@ impl Avx512 {
         Avx2::detect().filter(|_| has).map(Self)
     }
 
-    /// The proof of AVX2 alone.
+    /// Proof of AVX2 alone.
     #[inline]
     pub(super) fn narrow(self) -> Avx2 {
         self.0
@@ -82,7 +82,7 @@ fn larger(_: Avx512, a: __m256, b: __m256) -> __m256 {
     unsafe { _mm256_range_ps::<0b1011>(a, b) }
 }
 
-/// Both halves of sixteen numbers.
+/// Splits sixteen numbers into halves.
 #[inline(always)]
 fn halves(a: __m512) -> (__m256, __m256) {
     // SAFETY: only called where a token proves the features.

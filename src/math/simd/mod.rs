@@ -1,11 +1,11 @@
-//! Eight, sixteen and thirty-two `f32` at once, on whatever the processor has.
+//! SIMD: eight, sixteen and thirty-two `f32` lanes on the best instruction set of the processor.
 //!
-//! A [`Kernel`] is written once over [`Simd`]; [`Level::run`] compiles it for each instruction set and takes the best one
-//! that the machine offers. Every operation but `mul_add` and its kin rounds as its scalar form does, so that a kernel
-//! gives the same bits on every level.
+//! A [`Kernel`] is written once over [`Simd`]; [`Level::run`] compiles it for each instruction set and takes the best one of
+//! the machine. Every operation except `mul_add` and its kin rounds like its scalar form, so that a kernel gives the same
+//! bits on every level.
 //!
-//! The only `unsafe` code of the library is in `avx2`, `avx512` and `neon`: a value of a level's token type exists only after
-//! the processor was asked, and the operations of a level take its token.
+//! The only `unsafe` code of the library is in `avx2`, `avx512` and `neon`: a token of a level exists only after the
+//! processor's features were checked, and the operations of a level take its token.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -25,44 +25,45 @@ use thiserror::Error;
 
 pub use portable::Portable;
 
-/// Lanes of the boxes of a node and the triangles of a block.
+/// Lanes for the boxes of a node and the triangles of a block.
 pub const LANES: usize = 8;
 
-/// Lanes of the rays of a packet.
+/// Lanes for the rays of a packet.
 pub const WIDE: usize = 16;
 
-/// Lanes of the rays of a broad packet.
+/// Lanes for the rays of a broad packet.
 pub const BROAD: usize = 32;
 
 /// Eight numbers in memory, as nodes and blocks store them.
 pub type Row = [f32; LANES];
 
-/// See [`Lanewise::rounds_surely`].
+/// Relative margin of [`Lanewise::rounds_surely`].
 pub const ROUNDED: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// What makes a double that is too near to the middle between two floats carry over the bits of [`NEAR_MIDDLE`]: the last 29
-/// bits are cut off when it is rounded, and 2⁻⁴⁰ of it is at most 2¹³ in units of the last. Twice that is kept away from.
+/// Added to the bits of a double, carries exactly if it is too near to the midpoint between two floats, which clears the bits
+/// of [`NEAR_MIDDLE`]: rounding cuts off the last 29 bits, and 2⁻⁴⁰ of the number is at most 2¹³ in units of the last. The
+/// margin is twice that.
 #[cfg(target_arch = "x86_64")]
 const MIDDLE: i64 = (1 << 14) - (1 << 28);
 
-/// The bits that are zero then.
+/// Bits that are zero near a midpoint, after [`MIDDLE`] is added.
 #[cfg(target_arch = "x86_64")]
 const NEAR_MIDDLE: i64 = (1 << 29) - (1 << 15);
 
-/// Arithmetic of one instruction set on `N` numbers at once. A value of the type is the proof that the machine has it.
+/// Arithmetic of one instruction set on `N` numbers at once. A value of the type proves that the machine has it.
 ///
-/// Comparisons give a mask: bit k is set where lane k holds.
+/// Comparisons return a mask: bit k is set if the comparison holds in lane k.
 pub trait Lanewise<const N: usize>: Copy {
-    /// N numbers.
+    /// `N` numbers in single precision.
     type Lanes: Copy;
-    /// N numbers of double precision.
+    /// `N` numbers in double precision.
     type Doubles: Copy;
 
-    /// One number in all lanes.
+    /// Broadcasts one number to all lanes.
     fn splat(self, x: f32) -> Self::Lanes;
-    /// From memory.
+    /// Loads a row.
     fn load(self, row: &[f32; N]) -> Self::Lanes;
-    /// To memory.
+    /// Stores a row.
     fn store(self, a: Self::Lanes) -> [f32; N];
     /// a + b.
     fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
@@ -72,74 +73,74 @@ pub trait Lanewise<const N: usize>: Copy {
     fn mul(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
     /// a / b.
     fn div(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
-    /// a · b + c, rounded once or twice: for what is bounded either way, and decides no bit of an answer.
+    /// a · b + c, rounded once or twice: for values whose error is bounded either way, and that decide no bit of an answer.
     fn mul_add(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
-    /// a · b − c, in the same way.
+    /// a · b − c, rounded once or twice.
     fn mul_sub(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
-    /// c − a · b, in the same way.
+    /// c − a · b, rounded once or twice.
     fn sub_mul(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
     /// |a|.
     fn abs(self, a: Self::Lanes) -> Self::Lanes;
-    /// The greater of both; b where one is NaN.
+    /// Maximum; b if one is NaN.
     fn greater(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
-    /// The greater of both sizes; either where one is NaN.
+    /// Maximum of the absolute values; either if one is NaN.
     #[inline(always)]
     fn larger(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
         self.greater(self.abs(a), self.abs(b))
     }
-    /// The smaller of both; b where one is NaN.
+    /// Minimum; b if one is NaN.
     fn smaller(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
-    /// The later of two distances along a ray, neither NaN; either where both have a negative sign or are zero. By their bits
-    /// where the machine compares words in less time.
+    /// Later of two distances along a ray, neither NaN; either if both have a negative sign or are zero. Compares bits where
+    /// the machine compares words faster.
     #[inline(always)]
     fn later(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
         self.greater(a, b)
     }
-    /// The sooner of two distances along a ray, neither NaN; either where both have a negative sign or are zero.
+    /// Sooner of two distances along a ray, neither NaN; either if both have a negative sign or are zero.
     #[inline(always)]
     fn sooner(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
         self.smaller(a, b)
     }
-    /// The latest of distances along a ray, none NaN; any of them where all have a negative sign, either of two zeros.
+    /// Latest of the distances along a ray in all lanes, none NaN; any if all have a negative sign, either of two zeros.
     #[inline(always)]
     fn latest(self, a: Self::Lanes) -> f32 {
         self.greatest(a)
     }
-    /// Where a distance that has no negative sign is no later than another, neither NaN; also false where that one is −0.
+    /// a ≤ b for distances, neither NaN, where a has no negative sign; also false where b is −0.
     #[inline(always)]
     fn in_order(self, a: Self::Lanes, b: Self::Lanes) -> u32 {
         self.at_most(a, b)
     }
-    /// a < b; false where one is NaN.
+    /// a < b; false if one is NaN.
     fn less(self, a: Self::Lanes, b: Self::Lanes) -> u32;
-    /// a ≤ b; false where one is NaN.
+    /// a ≤ b; false if one is NaN.
     fn at_most(self, a: Self::Lanes, b: Self::Lanes) -> u32;
     /// `a` in the lanes of `mask`, else `b`.
     fn choose(self, mask: u32, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
-    /// Which lanes have a negative sign, that of zero and NaN included.
+    /// Mask of the lanes with a negative sign, that of zero and NaN included.
     fn signs(self, a: Self::Lanes) -> u32;
-    /// The sizes of `a` with the signs of `b`.
+    /// Absolute values of `a` with the signs of `b`.
     fn with_sign(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
-    /// The smallest of all lanes, of which none is NaN; of two zeros either.
+    /// Minimum of all lanes, none NaN; either of two zeros.
     fn least(self, a: Self::Lanes) -> f32;
-    /// The greatest of all lanes, of which none is NaN; of two zeros either.
+    /// Maximum of all lanes, none NaN; either of two zeros.
     fn greatest(self, a: Self::Lanes) -> f32;
-    /// [`Self::least`] of each of four.
+    /// [`Self::least`] of each of four vectors.
     #[inline(always)]
     fn least_of_each(self, [a, b, c, d]: [Self::Lanes; 4]) -> [f32; 4] {
         [self.least(a), self.least(b), self.least(c), self.least(d)]
     }
-    /// A word to memory in the lanes of `mask`; the others stay.
+    /// Stores a word in the lanes of `mask`; the others stay.
     fn put_word(self, mask: u32, word: u32, to: &mut [u32; N]);
-    /// Where a word stands.
+    /// Mask of the places where `word` stands.
     fn find_word(self, word: u32, among: &[u32; N]) -> u32;
-    /// One number in all lanes.
+    /// Broadcasts one number to all lanes.
     fn splat_f64(self, x: f64) -> Self::Doubles;
-    /// Numbers in double precision.
+    /// Converts to double precision.
     fn widen(self, a: Self::Lanes) -> Self::Doubles;
-    /// The nearest numbers in single precision.
+    /// Rounds to single precision.
     fn narrow(self, a: Self::Doubles) -> Self::Lanes;
-    /// To memory.
+    /// Stores a row in double precision.
     fn store_f64(self, a: Self::Doubles) -> [f64; N];
     /// a + b.
     fn add_f64(self, a: Self::Doubles, b: Self::Doubles) -> Self::Doubles;
@@ -151,61 +152,61 @@ pub trait Lanewise<const N: usize>: Copy {
     fn div_f64(self, a: Self::Doubles, b: Self::Doubles) -> Self::Doubles;
     /// |a|.
     fn abs_f64(self, a: Self::Doubles) -> Self::Doubles;
-    /// The greater of both; b where one is NaN.
+    /// Maximum; b if one is NaN.
     fn greater_f64(self, a: Self::Doubles, b: Self::Doubles) -> Self::Doubles;
-    /// The smaller of both; b where one is NaN.
+    /// Minimum; b if one is NaN.
     fn smaller_f64(self, a: Self::Doubles, b: Self::Doubles) -> Self::Doubles;
-    /// Where all numbers within a part [`ROUNDED`] of the finite `a`, which is in the normal range of single precision, have
-    /// the same nearest number there; it may also be false where they have.
+    /// Whether all numbers within a relative distance of [`ROUNDED`] of the finite `a`, which is in the normal range of
+    /// single precision, round to the same single; may also be false where they do.
     #[inline(always)]
     fn rounds_surely(self, a: Self::Doubles) -> u32 {
         let room = self.mul_f64(self.abs_f64(a), self.splat_f64(ROUNDED));
         let (low, high) = (self.narrow(self.sub_f64(a, room)), self.narrow(self.add_f64(a, room)));
         self.at_most(low, high) & self.at_most(high, low)
     }
-    /// a < b; false where one is NaN.
+    /// a < b; false if one is NaN.
     fn less_f64(self, a: Self::Doubles, b: Self::Doubles) -> u32;
     /// `a` in the lanes of `mask`, else `b`.
     fn choose_f64(self, mask: u32, a: Self::Doubles, b: Self::Doubles) -> Self::Doubles;
 }
 
-/// One instruction set: eight lanes, what nodes and blocks need besides, and sixteen lanes.
+/// One instruction set: eight lanes with the operations for nodes and blocks, and wider lanes.
 pub trait Simd: Lanewise<LANES> {
     /// Sixteen lanes of the same machine.
     type Wide: Lanewise<WIDE>;
-    /// Thirty-two lanes of it.
+    /// Thirty-two lanes of the same machine.
     type Broad: Lanewise<BROAD>;
-    /// Whether these fit into its registers: elsewhere numbers go through memory, and sixteen lanes are faster (measured).
+    /// Whether thirty-two lanes fit into the registers: elsewhere values spill to memory, and sixteen lanes are faster
+    /// (measured).
     const BROAD_FITS: bool;
 
-    /// Sixteen lanes.
+    /// Returns the token for sixteen lanes.
     fn wide(self) -> Self::Wide;
-    /// Thirty-two lanes.
+    /// Returns the token for thirty-two lanes.
     fn broad(self) -> Self::Broad;
-    /// Which words have their highest bit set.
+    /// Mask of the words whose highest bit is set.
     fn high_bits(self, words: &[u32; LANES]) -> u32;
-    /// The row of an axis.
+    /// Loads the row of an axis.
     fn along(self, rows: &[Row; 3], axis: Axis) -> Self::Lanes;
-    /// One of six rows.
+    /// Loads one of six rows.
     fn pick(self, rows: &[Row; 6], pick: Pick) -> Self::Lanes;
-    /// Rows of four become columns: lane k of the i-th result is number i of the k-th row.
+    /// Transposes rows of four: lane k of the i-th result is number i of the k-th row.
     fn columns(self, rows: [&[f32; 4]; LANES]) -> [Self::Lanes; 4];
-    /// Columns as rows again.
+    /// Transposes back to rows of four.
     fn rows(self, columns: [Self::Lanes; 4]) -> [[f32; 4]; LANES];
-    /// To memory in another order: place k gets the lane, 0 to 7, that the `k`th four bits of `order` name.
+    /// Stores the lanes in another order: place k gets the lane, 0 to 7, in the `k`th four bits of `order`.
     fn arrange(self, a: Self::Lanes, order: Order, to: &mut Row);
-    /// Eight words to memory in another order, as [`Self::arrange`] does.
+    /// Stores eight words in another order, like [`Self::arrange`].
     fn arrange_words(self, words: &[u32; LANES], order: Order, to: &mut [u32; LANES]);
-    /// Those of eight numbers that are at these places, by the lowest three bits of each.
+    /// Looks up eight numbers in a table by the lowest three bits of each place.
     fn among(self, table: &Row, places: &[u32; LANES]) -> Self::Lanes;
-    /// Tells the processor that the first four cache lines of one of both are read soon, without a branch; elements that
-    /// there are not do no harm.
+    /// Prefetches the first four cache lines of one of two elements, without a branch; indices out of range do no harm.
     fn prefetch_either<T, U>(self, first: bool, a: (&[T], usize), b: (&[U], usize));
-    /// Tells the processor that all of this is read soon.
+    /// Prefetches a whole slice.
     fn prefetch<T>(self, all: &[T]);
 }
 
-/// Which of six rows, by the bytes before it: found once and used often, without a test that it is one of them.
+/// Index of one of six rows, as a byte offset: computed once and used often, without a bounds check.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pick(u32);
 
@@ -217,7 +218,7 @@ impl Pick {
         Self((i % 6 * size_of::<Row>()) as u32)
     }
 
-    /// The other row of a pair: 0 and 1, 2 and 3, 4 and 5.
+    /// The other row of its pair: 0 and 1, 2 and 3, 4 and 5.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "a row is small")]
     pub const fn other(self) -> Self {
@@ -225,7 +226,7 @@ impl Pick {
     }
 }
 
-/// Which of three axes, by the bytes before its row: found once and used often, without a test that it is one of them.
+/// Index of one of three axes, as the byte offset of its row: computed once and used often, without a bounds check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Axis(u32);
 
@@ -237,33 +238,33 @@ impl Axis {
     }
 }
 
-/// Lanes in some order, four bits each, the first in the lowest.
+/// Permutation of lanes, four bits each, the first in the lowest.
 pub type Order = u32;
 
-/// Code that is compiled once for each instruction set.
+/// Code that is compiled once per instruction set.
 ///
-/// `run` and all that it calls with a token are `#[inline(always)]`. Lanes must not pass through closures or `map`: what
-/// is not inlined is compiled without the instructions, and lanes go through memory.
+/// `run` and everything it calls with a token must be `#[inline(always)]`. Lanes must not pass through closures or `map`:
+/// code that is not inlined is compiled without the instructions, and lanes go through memory.
 pub trait Kernel {
-    /// What it gives.
+    /// Result of the kernel.
     type Output;
 
-    /// Runs on one instruction set.
+    /// Runs on the given instruction set.
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
-/// Room on the stack that begins where a cache line does, and makes the whole frame of the function that has it begin there.
+/// Stack variable aligned to a cache line, which aligns the whole frame of its function.
 ///
-/// Without it a frame begins at any multiple of sixteen bytes, and where a compiler has no registers left it keeps vectors in
-/// places that may lie across two lines. Where two pages meet in one of them, rays one by one are 20 to 40 % slower, and where
-/// the stack begins differs from one start of a program to the next.
+/// Without it a frame begins at any multiple of sixteen bytes, and spilled vectors may lie across two cache lines. Where such
+/// a line boundary is also a page boundary, rays one by one are 20 to 40 % slower, and the start of the stack differs from
+/// one run of a program to the next.
 #[cfg(target_arch = "x86_64")]
 #[repr(align(64))]
 struct LineOnStack(#[expect(dead_code, reason = "it is there to be somewhere")] u8);
 
 #[cfg(target_arch = "x86_64")]
 impl LineOnStack {
-    /// Makes the caller's frame begin there. What is constant, or not looked at, would not be on the stack.
+    /// Aligns the caller's frame. The variable must be mutable and observed to be on the stack at all.
     #[inline(always)]
     fn align() {
         std::hint::black_box(&mut Self(0));
@@ -285,15 +286,15 @@ enum Set {
     Neon,
 }
 
-/// What [`Level::best`] gives, once it has been asked for or chosen.
+/// Result of [`Level::best`], once it has been asked for or chosen.
 static CHOSEN: OnceLock<Level> = OnceLock::new();
 
-/// A name that is no level of this machine, and those that are.
+/// Error: a name that is no level of this machine, with the levels that exist.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("no instruction set of this machine is named {0:?}; there are: {names}", names = names(.1))]
 pub struct UnknownLevel(String, Vec<Level>);
 
-/// As they are typed.
+/// Names of the levels as typed.
 fn names(levels: &[Level]) -> String {
     levels.iter().map(|level| level.word()).collect::<Vec<_>>().join(", ")
 }
@@ -301,7 +302,7 @@ fn names(levels: &[Level]) -> String {
 impl FromStr for Level {
     type Err = UnknownLevel;
 
-    /// One of [`Level::all`], by its name or [`Level::word`].
+    /// Parses the name or [`Level::word`] of one of [`Level::all`].
     fn from_str(text: &str) -> Result<Self, UnknownLevel> {
         let all = Self::all();
         let named = |level: &&Self| [level.name(), level.word()].iter().any(|name| name.eq_ignore_ascii_case(text));
@@ -309,18 +310,18 @@ impl FromStr for Level {
     }
 }
 
-/// Runs a kernel's portable form, apart from where the others are called: without optimisation kernels have frames of a
-/// megabyte, and one that holds two of them is too large for the stacks of threads.
+/// Runs a kernel's portable form in a function of its own: without optimisation kernels have frames of a megabyte, and a
+/// frame with two of them is too large for the stacks of threads.
 #[inline(never)]
 pub(crate) fn portably<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Portable)
 }
 
 impl Level {
-    /// What every machine has.
+    /// The level that every machine has.
     pub const PORTABLE: Self = Self(Set::Portable);
 
-    /// All that this machine has, the fastest last.
+    /// All levels of this machine, the fastest last.
     pub fn all() -> Vec<Self> {
         let all = [Self::PORTABLE].into_iter();
         #[cfg(target_arch = "x86_64")]
@@ -332,25 +333,25 @@ impl Level {
         all.collect()
     }
 
-    /// The fastest that this machine has, unless another was chosen ([`Self::choose`]).
+    /// Fastest level of this machine, unless another was chosen ([`Self::choose`]).
     #[inline]
     pub fn best() -> Self {
         *CHOSEN.get_or_init(|| *Self::all().last().unwrap_or(&Self::PORTABLE))
     }
 
-    /// Makes this the level that [`Self::best`] gives to the whole process: to be called before anything is loaded or built.
-    /// Answers are the same on every level, times are not. Levels are compared within a process by
+    /// Makes this the result of [`Self::best`] for the whole process: to be called before anything is loaded or built.
+    /// Answers are the same on every level, times are not. To compare levels within a process, use
     /// [`Wide::at_level`](crate::accel::Wide::at_level).
     ///
     /// # Errors
     ///
-    /// The level that was given out before, where it is another.
+    /// The level already in use, if it is another one.
     pub fn choose(self) -> Result<(), Self> {
         let chosen = *CHOSEN.get_or_init(|| self);
         if chosen == self { Ok(()) } else { Err(chosen) }
     }
 
-    /// As printed.
+    /// Name in reports.
     pub fn name(self) -> &'static str {
         match self.0 {
             Set::Portable => "portable",
@@ -363,7 +364,7 @@ impl Level {
         }
     }
 
-    /// As typed: the name in small letters, without a hyphen.
+    /// Name on the command line: lower case, without a hyphen.
     pub fn word(self) -> &'static str {
         match self.0 {
             Set::Portable => "portable",
@@ -390,18 +391,18 @@ impl Level {
         }
     }
 
-    /// Runs a kernel for which code for the widest lanes is not worth its size: AVX2 where there is AVX-512.
+    /// Runs a kernel for which the code size of the widest lanes does not pay: with AVX2 instead of AVX-512.
     #[inline]
     pub fn run_narrow<K: Kernel>(self, kernel: K) -> K::Output {
         if self == Self::PORTABLE { portably(kernel) } else { self.run_vectors(kernel) }
     }
 
-    /// Runs a kernel that is compiled for vectors alone, AVX2's or NEON's: the scalar form takes many times as long to
-    /// compile, too long for kernels that only tests run.
+    /// Runs a kernel that is compiled for AVX2 or NEON only: compiling the scalar form takes many times as long, too long for
+    /// kernels that only tests run.
     ///
     /// # Panics
     ///
-    /// Where there are no such vectors.
+    /// If the machine has no such vectors.
     #[inline]
     #[cfg_attr(
         not(any(target_arch = "x86_64", target_arch = "aarch64")),

@@ -1,6 +1,6 @@
 //! Eight lanes in two 128-bit registers of ARMv8.
 //!
-//! Invariant of every `unsafe` here: every processor of that family has the instructions, and compilers are told so.
+//! Invariant of every `unsafe` here: every processor of the family has the instructions, and the compiler knows.
 
 #![expect(unsafe_code, reason = "instructions that every processor of the family has; see the module's invariant")]
 
@@ -9,7 +9,7 @@ use std::arch::aarch64::*;
 use super::pair::Pair;
 use super::{Axis, Kernel, LANES, Lanewise, Order, Pick, Row, Simd};
 
-/// The instructions that every processor of the family has.
+/// Token of instructions that every processor of the family has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Neon;
 
@@ -59,21 +59,21 @@ fn store_pair(a: float64x2_t, to: &mut [f64; 2]) {
     unsafe { vst1q_f64(to.as_mut_ptr(), a) };
 }
 
-/// A bit for each lane of four whose bits are all set.
+/// Bit mask of the lanes, out of four, whose bits are all set.
 #[inline(always)]
 fn mask(holds: uint32x4_t) -> u32 {
     // SAFETY: every processor of the family has the instructions.
     unsafe { vaddvq_u32(vandq_u32(holds, load_words(&[1, 2, 4, 8]))) }
 }
 
-/// All bits of the lanes of a mask of four.
+/// Expands a mask of four to lanes of all ones or zeros.
 #[inline(always)]
 fn lanes_in(mask: u32) -> uint32x4_t {
     // SAFETY: every processor of the family has the instructions.
     unsafe { vtstq_u32(vdupq_n_u32(mask), load_words(&[1, 2, 4, 8])) }
 }
 
-/// All bits of the first or the last two lanes of a mask of two.
+/// Expands a mask of two to lanes of all ones or zeros.
 #[inline(always)]
 fn pair_in(mask: u32) -> uint64x2_t {
     // SAFETY: every processor of the family has the instructions.
@@ -83,7 +83,7 @@ fn pair_in(mask: u32) -> uint64x2_t {
     }
 }
 
-/// Four rows of four as columns; its own inverse.
+/// Transposes four rows of four; its own inverse.
 #[inline(always)]
 fn turned([a, b, c, d]: [float32x4_t; 4]) -> [float32x4_t; 4] {
     // SAFETY: every processor of the family has the instructions.
@@ -99,7 +99,7 @@ fn turned([a, b, c, d]: [float32x4_t; 4]) -> [float32x4_t; 4] {
     }
 }
 
-/// Eight words in another order.
+/// Permutes eight words.
 #[inline(always)]
 fn arranged(low: uint8x16_t, high: uint8x16_t, order: Order) -> [uint8x16_t; 2] {
     // SAFETY: every processor of the family has the instructions.
@@ -476,7 +476,7 @@ impl Simd for Neon {
     fn prefetch<T>(self, _: &[T]) {}
 }
 
-/// Four bits a byte.
+/// Expands each four bits to a byte.
 #[inline(always)]
 fn in_bytes(order: Order) -> u64 {
     let halves = (u64::from(order) | u64::from(order) << 16) & 0x0000_ffff_0000_ffff;

@@ -1,8 +1,8 @@
-//! Twice as many lanes as two halves.
+//! Twice as many lanes, as two halves.
 
 use super::{BROAD, LANES, Lanewise, WIDE};
 
-/// Two halves of equally many lanes.
+/// Token for two halves of equally many lanes.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<S>(pub(super) S);
 

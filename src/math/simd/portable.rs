@@ -1,9 +1,9 @@
-//! The scalar form: what the other levels must equal bit for bit.
+//! Scalar form, which the other levels must equal bit for bit.
 
 use super::pair::Pair;
 use super::{Axis, LANES, Lanewise, Order, Pick, Row, Simd};
 
-/// Needs nothing of the processor.
+/// Token of the scalar form, which needs no features of the processor.
 #[derive(Clone, Copy, Debug)]
 pub struct Portable;
 

@@ -1,4 +1,4 @@
-//! Every level rounds, compares and moves as plain numbers do.
+//! Every level rounds, compares and moves like scalar code.
 
 use super::*;
 use crate::math::random::Random;
@@ -27,7 +27,7 @@ fn a_level_that_was_given_out_stays() {
 const HARD: [f32; 10] =
     [0.0, -0.0, 1.0, -3.5, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-42, f32::MAX, f32::MIN_POSITIVE];
 
-/// The sign and payload of a NaN are nobody's business.
+/// Bits of a number; all NaNs are equal, because their sign and payload may differ.
 fn bits(x: f32) -> u64 {
     u64::from(if x.is_nan() { f32::NAN.to_bits() } else { x.to_bits() })
 }
@@ -36,7 +36,7 @@ fn bits_f64(x: f64) -> u64 {
     if x.is_nan() { f64::NAN.to_bits() } else { x.to_bits() }
 }
 
-/// All that is done with lanes, as bits. `mask` is some lanes.
+/// Results of all operations on lanes, as bits. `mask` selects some lanes.
 #[inline(always)]
 fn everything<S: Lanewise<N>, const N: usize>(s: S, rows: &[[f32; N]; 2], mask: u32) -> Vec<u64> {
     let (a, b) = (s.load(&rows[0]), s.load(&rows[1]));
@@ -78,7 +78,7 @@ fn everything<S: Lanewise<N>, const N: usize>(s: S, rows: &[[f32; N]; 2], mask: 
     all
 }
 
-/// The same by plain numbers, one lane after another.
+/// The same results in scalar arithmetic, one lane after another.
 fn plainly<const N: usize>(rows: &[[f32; N]; 2], mask: u32) -> Vec<u64> {
     let [a, b] = rows;
     let each = |f: fn(f32, f32) -> f32| (0..N).map(|k| bits(f(a[k], b[k]))).collect::<Vec<_>>();
@@ -133,7 +133,7 @@ impl Kernel for Narrow {
     }
 }
 
-/// Sixteen and thirty-two lanes.
+/// Kernel for sixteen and thirty-two lanes.
 struct More([[f32; WIDE]; 2], [[f32; BROAD]; 2], u32);
 
 impl Kernel for More {
@@ -165,7 +165,7 @@ fn every_level_computes_like_plain_numbers() {
     }
 }
 
-/// Least and greatest of all lanes.
+/// Kernel for the least and the greatest of all lanes.
 struct Ends([f32; BROAD]);
 
 impl Kernel for Ends {
@@ -197,7 +197,7 @@ fn the_ends_of_a_row_are_found_wherever_they_stand() {
     }
 }
 
-/// The least of each of four rows, thirty-two lanes long, sixteen and eight.
+/// Kernel for the least of each of four rows, with thirty-two, sixteen and eight lanes.
 struct LeastOfEach([[f32; BROAD]; 4]);
 
 impl Kernel for LeastOfEach {
@@ -228,7 +228,7 @@ fn the_least_of_each_of_four_rows_is_found_wherever_it_stands() {
     }
 }
 
-/// Rows as columns, and back; a row in another order; one of six rows; numbers of a table.
+/// Kernel that transposes rows and back, permutes a row, picks one of six rows, and looks up numbers in a table.
 struct Moved([[f32; 4]; LANES]);
 
 impl Kernel for Moved {
@@ -273,7 +273,7 @@ fn the_second_operand_wins_over_nan() {
     assert_eq!((s.less(nan, one), s.at_most(one, nan), s.less(one, s.splat(2.0))), (0, 0, 255));
 }
 
-/// What is told of distances: the later ones, the sooner ones, which are in order, and the latest.
+/// Comparisons of distances: the later ones, the sooner ones, the mask of ordered ones, and the latest.
 #[inline(always)]
 fn distances<S: Lanewise<N>, const N: usize>(s: S, [a, b]: &[[f32; N]; 2]) -> ([[f32; N]; 2], u32, f32) {
     let (a, b) = (s.load(a), s.load(b));
@@ -335,12 +335,12 @@ fn every_level_knows_the_later_of_two_distances_from_zero_on() {
     }
 }
 
-/// [`HARD`], and NaN with the other sign.
+/// [`HARD`], and a NaN with the other sign.
 fn hard() -> Vec<f32> {
     HARD.into_iter().chain([f32::from_bits(0xffc0_0001)]).collect()
 }
 
-/// Every two of them beside each other somewhere, with some lanes.
+/// Calls `check` with rows in which every two hard numbers stand side by side, and a mask of some lanes.
 fn each_hard_pair(mut check: impl FnMut([Row; 2], u32)) {
     let all = hard();
     for (i, &x) in all.iter().enumerate() {
@@ -352,7 +352,7 @@ fn each_hard_pair(mut check: impl FnMut([Row; 2], u32)) {
     }
 }
 
-/// What only eight lanes do, as bits: nothing of it computes, so that NaN keeps its own.
+/// Kernel for the operations that only eight lanes have, as bits: none of them computes, so that NaNs keep theirs.
 struct Only8([Row; 2], u32);
 
 impl Kernel for Only8 {
@@ -411,7 +411,7 @@ fn the_larger_of_two_sizes_has_no_sign() {
     });
 }
 
-/// Rows by their axis, and by their number, with the other of the pair.
+/// Kernel that loads rows by axis, and by index, with the other row of the pair.
 struct Rows([Row; 6]);
 
 impl Kernel for Rows {
@@ -490,9 +490,9 @@ impl Kernel for Products {
     }
 }
 
-/// The three, each rounded twice and once.
+/// The three products, each rounded twice and once.
 fn products_of([a, b, c]: [f32; 3]) -> [[f32; 2]; 3] {
-    // Not the system's, of which some round twice.
+    // Not the system's `fma`, which may round twice.
     let once = libm::fmaf;
     [[a * b + c, once(a, b, c)], [a * b - c, once(a, b, -c)], [c - a * b, once(-a, b, c)]]
 }
@@ -521,7 +521,7 @@ fn a_product_and_a_sum_are_rounded_once_or_twice() {
     }
     let mut random = Random::new(31);
     for _ in 0..300 {
-        // Sums that nearly cancel tell the two apart.
+        // Sums that nearly cancel distinguish one rounding from two.
         let a: [f32; WIDE] = std::array::from_fn(|_| random.unit() + 0.5);
         let b: [f32; WIDE] = std::array::from_fn(|_| random.unit() - 0.5);
         let c = std::array::from_fn(|k| -a[k] * b[k] * [1.0, -1.0, 0.75][k % 3]);
@@ -529,7 +529,7 @@ fn a_product_and_a_sum_are_rounded_once_or_twice() {
     }
 }
 
-/// Which of these are surely rounded, in eight lanes and in sixteen.
+/// Kernel for the masks of surely rounded numbers, in eight lanes and in sixteen.
 struct Rounds([[f64; LANES]; 2]);
 
 impl Kernel for Rounds {
@@ -537,7 +537,7 @@ impl Kernel for Rounds {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
-        /// Doubles from floats: what is left of each number after its nearest float.
+        /// Doubles from floats: the nearest float of each number, plus its remainder.
         #[inline(always)]
         fn doubles<S: Lanewise<N>, const N: usize>(s: S, row: &[f64; N]) -> S::Doubles {
             let nearest: [f32; N] = std::array::from_fn(|k| row[k] as f32);
@@ -559,7 +559,7 @@ fn what_is_surely_rounded_is_so_wherever_the_number_is_within_its_error() {
         for (k, x) in rows.as_flattened_mut().iter_mut().enumerate() {
             let float = (random.unit() + 0.5) * 2f32.powi(random.below(200) as i32 - 100);
             let middle = (f64::from(float) + f64::from(float.next_up())) / 2.0;
-            // Around the middle of two floats as far as matters, farther from it, and anywhere.
+            // Around the midpoint of two floats within the margin, farther from it, and at random.
             let size = match case % 3 {
                 0 => middle * (1.0 + f64::from(random.cube().x) * 4.0 * ROUNDED),
                 1 => middle * (1.0 + f64::from(random.cube().x) * 1e3 * ROUNDED),
@@ -570,7 +570,7 @@ fn what_is_surely_rounded_is_so_wherever_the_number_is_within_its_error() {
         for level in Level::all() {
             let [eights, sixteen] = level.run(Rounds(rows));
             for (k, x) in rows.as_flattened().iter().enumerate() {
-                // Doubles that two floats make have 48 bits.
+                // Doubles that are sums of two floats have 48 bits.
                 let x = f64::from(*x as f32) + f64::from((*x - f64::from(*x as f32)) as f32);
                 let one = (x * (1.0 - ROUNDED)) as f32 == (x * (1.0 + ROUNDED)) as f32;
                 for mask in [eights, sixteen] {
