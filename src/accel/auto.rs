@@ -205,7 +205,7 @@ fn build_for<'a>(
 }
 
 /// Builds a structure like [`build`] over `shapes` and `instanced` objects, for the given number of eye rays. The largest set
-/// of prims, `shapes` or one object, is the one that is judged.
+/// of prims, `shapes` or one object, is judged.
 pub fn build_with<'a>(
     eye_rays: u64,
     choice: AccelChoice,

@@ -14,7 +14,7 @@ pub trait Probe: Default + Send {
     /// Whether the probe records nothing, so that rays may be traced in any way that gives the same answers.
     const SILENT: bool = false;
 
-    /// Whether the probe sees so many rays that exact walks are compiled for every instruction set for it.
+    /// Whether the probe sees enough rays for exact walks to be compiled for every instruction set.
     const OF_PICTURES: bool = Self::SILENT;
 
     /// Records a query of one ray.
@@ -51,7 +51,7 @@ pub trait Probe: Default + Send {
 pub struct Visit {
     /// The node or cell.
     pub place: NodeId,
-    /// Its extent in the frame of the shapes.
+    /// Extent in the frame of the shapes.
     pub extent: Extent,
     /// Number of prims listed in it; `None` for an inner node.
     pub listed: Option<u32>,

@@ -70,7 +70,7 @@ pub trait QueryBatch {
         self.ray(i).t_min
     }
 
-    /// Turns the rays' own `t_min` of consecutive rays from `start` on into those of [`Self::t_min`].
+    /// Replaces the rays' own `t_min`, for consecutive rays from `start` on, by [`Self::t_min`].
     #[inline(always)]
     fn adapt_t_min(&self, _start: usize, _t_min: &mut [f32]) {}
 

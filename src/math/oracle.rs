@@ -19,7 +19,7 @@ fn hit(origin: Vec3, dir: Vec3, triangle: &Triangle) -> Option<RBig> {
     rational::hit(&point(origin), &point(dir), triangle)
 }
 
-/// Whether `t` is a float nearest to `exact`.
+/// Whether `t` is a float nearest to `exact_t`.
 fn is_nearest(t: f32, exact_t: &RBig) -> bool {
     if t.is_infinite() {
         let overflow = RBig::from(IBig::from(2).pow(128) - IBig::from(2).pow(103));

@@ -154,12 +154,12 @@ impl<R: Real> Real3<R> {
         Self([0, 1, 2].map(|k| self.0[k] - b.0[k]))
     }
 
-    /// Inner product.
+    /// Dot product.
     pub fn dot(self, b: Self) -> R {
         self.0[0] * b.0[0] + self.0[1] * b.0[1] + self.0[2] * b.0[2]
     }
 
-    /// Outer product.
+    /// Cross product.
     pub fn cross(self, b: Self) -> Self {
         Self([(1, 2), (2, 0), (0, 1)].map(|(i, j)| self.0[i] * b.0[j] - self.0[j] * b.0[i]))
     }

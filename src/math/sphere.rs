@@ -4,12 +4,12 @@
 //! After E. Haines, J. Günther, T. Akenine-Möller, *Precision Improvements for Ray/Sphere Intersection*, Ray Tracing
 //! Gems, 2019, chapter 7: the discriminant is r² − |f − (f·d) d|², from the point of the line nearest to the centre,
 //! instead of the difference B² − C of two large squares; and the smaller root comes from the larger one.
+//!
 //! - A distance is within 2½ ulp (`f32`) of the exact one. Near the origin, below [`ROUND_ROOM`](super::bounds::ROUND_ROOM)
 //!   of the radius, the error is absolute, and distances that cannot be told from 0 are 0: a ray that starts on the sphere
 //!   hits it at 0.
 //! - The verdict is exact unless the line passes the rim within 2⁻⁹⁰ of the distance from which the ray comes; there it
 //!   counts as a hit.
-//!   as a hit.
 
 use super::quotient::round;
 use super::real::{Double, Real, Real3};

@@ -26,7 +26,7 @@ pub fn placed(frame_from_object: &DAffine3, corner: Vec3) -> Vec3 {
 #[derive(Clone, Debug)]
 pub struct ObjectTransform {
     frame_from_object: DAffine3,
-    /// N.
+    /// The inverse matrix N.
     object_from_frame: DMat3,
     /// Largest distance on each axis between an object's corners and the same corners placed and transformed back.
     pub room: Vec3,
@@ -57,7 +57,7 @@ impl ObjectTransform {
         (place.room.max_element() <= size * PLACED_ROOM).then_some(place)
     }
 
-    /// [`placed`].
+    /// Corner of the object in the scene's frame, by [`placed`].
     #[inline]
     pub fn corner(&self, corner: Vec3) -> Vec3 {
         placed(&self.frame_from_object, corner)

@@ -91,7 +91,7 @@ struct SlotMasks {
     ended: u32,
 }
 
-/// All slots.
+/// Slots of all rays in flight.
 #[derive(Clone, Debug)]
 pub(super) struct Slots {
     slots: Box<[Slot; SLOTS]>,

@@ -7,7 +7,7 @@
 //!   prims instead of the cell, so that empty space is never visited.
 //! - `fast-bvh` ([`Splitting::SurfaceArea`]): a hierarchy of boxes by the surface area heuristic in bins.
 //!
-//! In both, the binary cuts are improved and fused into nodes of eight (`build`). Each prim is listed once, so there is no
+//! In both, the binary tree is improved and collapsed into 8-wide nodes (`build`). Each prim is listed once, so there is no
 //! mailbox: there would be nothing for it to save.
 //!
 //! Rays are traced one by one (`single`), many in flight (`flight`) or in packets of sixteen and more (`packet`; packets of a
@@ -27,7 +27,7 @@ mod interval_ray;
 mod listed;
 mod packet_rays;
 mod single;
-// Its kernels are not compiled without vectors.
+// The kernels of `margins` are only compiled for vectors.
 mod block_cache;
 #[cfg(all(test, any(target_arch = "x86_64", target_arch = "aarch64")))]
 mod margins;

@@ -64,7 +64,7 @@ impl Cone {
         });
         let down = |x: f64| if f64::from(x as f32) <= x { x as f32 } else { (x as f32).next_down() };
         let (lo, hi) = (lo_a.min(lo_b).to_array(), hi_a.max(hi_b).to_array());
-        // One more for the rounding of the sum in `f64`.
+        // One float more, for the rounding of the sum in `f64`.
         Aabb {
             lo: Vec3::from_array(lo.map(|x| down(x).next_down())),
             hi: Vec3::from_array(hi.map(|x| -down(-x).next_down())),

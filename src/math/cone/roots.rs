@@ -85,7 +85,7 @@ fn scale(x: f64) -> f64 {
 /// The roots with the minus and with the plus sign, with running bounds of their errors.
 ///
 /// A bound counts roundings of [`Real::UNIT`] to first order and rounds the counts up by half or more, which covers the
-/// rest and the rounding of the bounds. With `last`, nothing stays unsure: what may touch, touches.
+/// rest and the rounding of the bounds. With `last`, nothing stays unsure: a line that may touch touches.
 fn solve<R: Real>(ray: &RaySpace, cone: &Cone, last: bool) -> [Root; 2] {
     let unit = R::UNIT;
     let (r0, r1) = (f64::from(cone.base_radius), f64::from(cone.apex_radius));

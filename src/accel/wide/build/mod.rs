@@ -120,7 +120,7 @@ struct Items {
 impl Items {
     /// All triangles, in their order.
     fn of_triangles(shapes: &Shapes) -> Self {
-        // Each chunk has as many places as triangles; pages that nothing is written to cost nothing.
+        // Each chunk has as many places as triangles; untouched pages cost nothing.
         let mut all: Vec<Item> = bytemuck::zeroed_vec(shapes.triangles.len());
         let chunks = all.par_chunks_mut(CHUNK).zip(shapes.triangles.par_chunks(CHUNK)).enumerate();
         let paired = chunks.map(|(i, (places, chunk))| {
