@@ -29,7 +29,7 @@ pub struct Shapes {
     pub cones: Vec<Cone>,
     /// Unbounded planes (unit normal n, offset d: n·p = d); tested before every structure.
     pub planes: Vec<(Vec3, f32)>,
-    /// One bit per prim, set if it is opaque. Prims beyond its end are opaque; empty: all are.
+    /// One bit per prim, set if it is opaque. Prims beyond its last word are opaque; empty: all are.
     pub opaque: BitSet,
     /// Start of each object made of faces: its first triangle and its first polygon, both counted from 0; ascending. Empty:
     /// all faces are one object.
@@ -86,12 +86,12 @@ impl BitSet {
     ///
     /// # Panics
     ///
-    /// If `i` is beyond the last bit.
+    /// If `i` is beyond the last word of 64 bits.
     pub fn get(&self, i: u32) -> bool {
         self.words[i as usize / 64] >> (i % 64) & 1 == 1
     }
 
-    /// Bit `i`, or `true` beyond the last bit.
+    /// Bit `i`, or `true` beyond the last word of 64 bits.
     #[inline]
     pub fn get_or_set(&self, i: u32) -> bool {
         self.words.get(i as usize / 64).copied().unwrap_or(u64::MAX) >> (i % 64) & 1 == 1
@@ -101,7 +101,7 @@ impl BitSet {
     ///
     /// # Panics
     ///
-    /// If `i` is beyond the last bit.
+    /// If `i` is beyond the last word of 64 bits.
     pub fn set(&mut self, i: u32, value: bool) {
         let mask = 1u64 << (i % 64);
         let word = &mut self.words[i as usize / 64];
