@@ -209,7 +209,8 @@ fn build_for<'a>(
 pub fn build_with<'a>(
     eye_rays: u64,
     choice: AccelChoice,
-    (shapes, instanced): (&'a Shapes, &'a InstancedObjects),
+    shapes: &'a Shapes,
+    instanced: &'a InstancedObjects,
     params: &AccelParams,
 ) -> (AnyAccel<'a>, Option<Reason>) {
     if instanced.is_empty() {

@@ -79,7 +79,12 @@ pub struct BitSet {
 impl BitSet {
     /// Creates `len` bits, all equal to `value`.
     pub fn filled(len: usize, value: bool) -> Self {
-        Self { words: vec![if value { u64::MAX } else { 0 }; len.div_ceil(64)] }
+        let mut words = vec![if value { u64::MAX } else { 0 }; len.div_ceil(64)];
+        // Bits beyond the last read as set.
+        if let Some(last) = words.last_mut().filter(|_| len % 64 > 0) {
+            *last |= u64::MAX << (len % 64);
+        }
+        Self { words }
     }
 
     /// Bit `i`.
@@ -91,7 +96,7 @@ impl BitSet {
         self.words[i as usize / 64] >> (i % 64) & 1 == 1
     }
 
-    /// Bit `i`, or `true` beyond the last word of 64 bits.
+    /// Bit `i`, or `true` beyond the last bit.
     #[inline]
     pub fn get_or_set(&self, i: u32) -> bool {
         self.words.get(i as usize / 64).copied().unwrap_or(u64::MAX) >> (i % 64) & 1 == 1

@@ -221,6 +221,17 @@ fn among_copies_of_a_triangle_the_lowest_is_hit_and_the_next_follow_in_order() {
 }
 
 #[test]
+fn prims_beyond_the_end_of_the_bits_are_opaque() {
+    for len in [0, 1, 63, 64, 65] {
+        for value in [false, true] {
+            let bits = BitSet::filled(len, value);
+            assert!((0..len).all(|i| bits.get_or_set(i as u32) == value), "{len}");
+            assert!((len..len + 130).all(|i| bits.get_or_set(i as u32)), "{len}");
+        }
+    }
+}
+
+#[test]
 fn shapes_without_a_word_on_it_are_opaque() {
     let shapes = scenes::soup(300, 0.4);
     let silent = Shapes { opaque: BitSet::default(), ..shapes.clone() };

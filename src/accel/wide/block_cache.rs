@@ -63,7 +63,8 @@ impl BlockCache {
     pub(super) fn place<S: Simd, T: Lanewise<N>, const N: usize>(
         &mut self,
         s: S,
-        (index, block): (u32, &Block),
+        index: u32,
+        block: &Block,
         fan: &Fan<T, N>,
     ) -> usize {
         let place = index as usize % PLACES;

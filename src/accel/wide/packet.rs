@@ -384,7 +384,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let used = (1 << count) - 1;
         match sight {
             Seen::Together(fan) => {
-                let place = trace.cache.place(s, (index, block), fan);
+                let place = trace.cache.place(s, index, block, fan);
                 let kept = trace.cache.at(place);
                 let lanes = self.rays.meets_any(s, &kept.planes, reach.farthest).1 & used;
                 self.test_each(wide, trace, (block, index, lanes), branch.rays, reach, (fan, &kept.ready))

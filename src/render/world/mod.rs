@@ -132,7 +132,7 @@ impl World {
         choice: AccelChoice,
         params: &AccelParams,
     ) -> (AnyAccel<'_>, Option<Reason>) {
-        auto::build_with(eye_rays, choice, (&self.shapes, &self.instanced), params)
+        auto::build_with(eye_rays, choice, &self.shapes, &self.instanced, params)
     }
 
     /// Reason for the structure that [`AccelChoice::Auto`] picks.
