@@ -1,7 +1,7 @@
-//! The letters of names in archives.
+//! Decoding of the file names in archives.
 
-/// What bytes from 128 on mean in names that are no UTF-8: the letters of the first PCs (code page 437), as the format has it
-/// (PKWARE, "APPNOTE.TXT", appendix D).
+/// Characters of the bytes from 128 on in names that are not UTF-8: code page 437, as the format prescribes (PKWARE,
+/// "APPNOTE.TXT", appendix D).
 const UPPER: [&str; 4] = [
     "ÇüéâäàåçêëèïîìÄÅÉæÆôöòûùÿÖÜ¢£¥₧ƒ",
     "áíóúñÑªº¿⌐¬½¼¡«»░▒▓│┤╡╢╖╕╣║╗╝╜╛┐",
@@ -9,9 +9,9 @@ const UPPER: [&str; 4] = [
     "αßΓπΣσµτΦΘΩδ∞φε∩≡±≥≤⌠⌡÷≈°∙·√ⁿ²■\u{a0}",
 ];
 
-/// A name as letters: UTF-8 where it is, whatever the archive says of it, as programs forget to say it.
+/// Decodes a file name: as UTF-8 where it is valid, whatever the archive's UTF-8 flag says, since programs forget to set it.
 ///
-/// Names that differ stay different, also those in the letters of other countries, of which nobody knows which they are.
+/// Distinct names stay distinct, even those in other code pages, which the archive does not name.
 pub(super) fn of(bytes: &[u8]) -> String {
     let letter = |&byte: &u8| match byte.checked_sub(128) {
         None => Some(char::from(byte)),

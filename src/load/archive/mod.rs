@@ -1,9 +1,9 @@
-//! Zip archives, as most models are downloaded: folders of files that are read where they are, without unpacking.
+//! Zip archives, as most models are downloaded: folders of files that are read in place, without unpacking.
 //!
-//! What lies in an archive has the path of the archive and then its own: `ship.zip/textures/hull.png`. Archives are not
-//! trusted: only a directory of bounded size is read, names that lead out of the archive are none, a file is never larger
-//! than its entry says, and its checksum has to be right. An archive in an archive is a file like others, unless it is all that
-//! could be the model.
+//! The path of a file in an archive is the archive's path followed by its own: `ship.zip/textures/hull.png`. Archives are not
+//! trusted: the directory is read up to a bounded size, names that lead out of the archive are skipped, a file is never larger
+//! than its entry says, and its checksum has to be right. An archive in an archive is an ordinary file, unless it is the only
+//! candidate for the model.
 
 mod letters;
 mod model;
@@ -24,30 +24,30 @@ use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
-/// Bytes of the directory of an archive that are read at most: of more than a hundred thousand names.
+/// Largest directory that is read, in bytes: enough for more than a hundred thousand names.
 const DIRECTORY: u64 = 1 << 24;
 
-/// Bytes of memory that a byte of the directory becomes, at most: names are short, and each comes with a few numbers.
+/// Upper bound of the bytes of memory per byte of the directory: names are short, and each comes with a few numbers.
 const PER_BYTE: u64 = 4;
 
-/// How an archive begins that has no files.
+/// First bytes of an archive without files.
 const EMPTY: &[u8] = b"PK\x05\x06";
 
-/// What is read at a time of a directory; no entry of it is longer.
+/// Bytes of the directory that are read at a time; no entry is longer.
 const CHUNK: usize = 1 << 18;
 
-/// What is unpacked at a time.
+/// Bytes of packed data that are read at a time.
 const PACKED: usize = 1 << 16;
 
-/// A zip archive, of which the names of all files are known.
+/// A zip archive whose directory has been read.
 pub struct Archive {
     path: PathBuf,
     zip: ZipArchive<Box<dyn ReaderAt + Send + Sync>>,
-    /// By name, with `/` between folders.
+    /// Files by name, with `/` between folders.
     entries: BTreeMap<String, Entry>,
-    /// Bytes of memory that it takes.
+    /// Bytes of memory that the archive takes.
     held: u64,
-    /// Bytes of all files in it, once they are unpacked, for each model there.
+    /// Bytes of all its files once unpacked, divided by the number of models.
     share: u64,
 }
 
@@ -73,34 +73,34 @@ impl Entry {
     }
 }
 
-/// Why an archive, or a file in it, cannot be read.
+/// Reason why an archive, or a file in it, cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ArchiveFault {
-    /// It is called an archive.
+    /// The file has an archive's name but is no zip archive.
     #[error("this is no zip archive")]
     None,
-    /// It is not all of one.
+    /// The archive is damaged or incomplete.
     #[error("the archive is damaged: {0}")]
     Damaged(String),
-    /// There are more names than are read.
+    /// The directory is larger than is read; its bytes.
     #[error("the directory of the archive has {0} bytes where {DIRECTORY} are read")]
     Crowded(u64),
-    /// It is protected by a password.
+    /// The file is protected by a password.
     #[error("it is encrypted")]
     Encrypted,
-    /// It is packed by a method other than Deflate.
+    /// The file is packed by a method other than Deflate.
     #[error("it is packed by {0}, which is not known here")]
     Method(String),
-    /// What is unpacked is not what was packed.
+    /// The unpacked data is not what was packed.
     #[error("it is damaged: {0}")]
     Spoiled(String),
 }
 
 impl ArchiveFault {
-    /// The code of messages about it.
+    /// Code of the diagnostics about this fault.
     pub const CODE: &str = "archive-unreadable";
 
-    /// What helps.
+    /// Returns what the user can do about this fault.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::None | Self::Damaged(_) | Self::Spoiled(_) => "get the archive again",
@@ -110,12 +110,12 @@ impl ArchiveFault {
         }
     }
 
-    /// This fault as a message about a file.
+    /// Returns this fault as a diagnostic about a file.
     pub fn diagnose(&self, file: &Path) -> Diagnostic {
         Diagnostic::new(Self::CODE, file, "", self.to_string()).remedy(self.remedy())
     }
 
-    /// What is wrong with an archive, if that is what an error tells.
+    /// Returns the archive fault inside an error, if there is one.
     pub fn of(error: &io::Error) -> Option<&Self> {
         error.get_ref()?.downcast_ref()
     }
@@ -133,13 +133,14 @@ impl fmt::Debug for Archive {
     }
 }
 
-/// Whether a file of this name that begins so is an archive to be looked into; some kinds of model are zip archives, too.
+/// Returns whether a file with this name and these first bytes is an archive to be opened; some model formats are zip archives,
+/// too.
 pub(super) fn is_archive(path: &Path, bytes: &[u8]) -> bool {
     let begins = bytes.starts_with(ZIP) || bytes.starts_with(EMPTY);
     begins && !is_zipped_kind(path)
 }
 
-/// Whether a file on disk is an archive.
+/// Returns whether a file on disk is an archive.
 fn is_archive_on_disk(path: &Path) -> io::Result<bool> {
     let (mut file, mut start) = (File::open(path)?, [0; ZIP.len()]);
     match file.read_exact(&mut start) {
@@ -150,17 +151,17 @@ fn is_archive_on_disk(path: &Path) -> io::Result<bool> {
 }
 
 impl Archive {
-    /// Looks into an archive on disk.
+    /// Opens an archive on disk.
     ///
     /// # Errors
-    /// Those of the system, and an [`ArchiveFault`] as the inner error of one.
+    /// Those of the system, or an [`ArchiveFault`] as the inner error.
     pub fn open(path: &Path) -> io::Result<Self> {
         let file = File::open(path)?;
         let length = file.metadata()?.len();
         Self::new(path, Box::new(rawzip::FileReader::from(file)), length)
     }
 
-    /// Looks into an archive in memory.
+    /// Opens an archive in memory.
     ///
     /// # Errors
     /// An [`ArchiveFault`] as the inner error.
@@ -192,55 +193,55 @@ impl Archive {
         Ok(Self { path: path.into(), zip, entries, held: PER_BYTE * directory, share })
     }
 
-    /// Its own path, as it was named.
+    /// Path of the archive, as the user named it.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Bytes of memory that it takes: of what its directory says, and of all of it where it does not lie on disk.
+    /// Bytes of memory that the archive takes: for its directory, and for all of its data where that is in memory.
     pub(super) fn held(&self) -> u64 {
         self.held
     }
 
-    /// Bytes of all files in it, once they are unpacked, for each model there.
+    /// Bytes of all its files once unpacked, divided by the number of models.
     pub fn share(&self) -> u64 {
         self.share
     }
 
-    /// The name in it of what has this path, with `/` between folders; `None` of what lies elsewhere.
+    /// Name in the archive of the file with this path, with `/` between folders; `None` if the path lies outside.
     pub(super) fn inside(&self, path: &Path) -> Option<String> {
         plain(path.strip_prefix(&self.path).ok()?)
     }
 
-    /// The path of what has this name in it.
+    /// Path of the file with this name in the archive.
     pub(super) fn path_of(&self, name: &str) -> PathBuf {
         if name.is_empty() { self.path.clone() } else { self.path.join(name) }
     }
 
-    /// Whether a file of this name is in it.
+    /// Returns whether the archive has a file of this name.
     pub fn has(&self, name: &Path) -> bool {
         self.entry(name).is_some()
     }
 
-    /// Whether any file in it lies in a folder of this name.
+    /// Returns whether the archive has a file below a folder of this name.
     pub fn has_folder(&self, name: &Path) -> bool {
         self.names_in(name).next().is_some()
     }
 
-    /// Bytes of a file in it, once it is unpacked, as the archive says; `None` if there is no such file.
+    /// Unpacked bytes of a file, as the directory states; `None` if there is no such file.
     pub fn length(&self, name: &Path) -> Option<u64> {
         self.entry(name).map(Entry::length)
     }
 
-    /// The names of what lies in a folder.
+    /// Names of the files and folders directly in a folder.
     pub fn names_in(&self, folder: &Path) -> impl Iterator<Item = &str> {
         let mut last = None;
         let names = self.below(folder).map(|name| name.split('/').next().unwrap_or_default());
-        // All in one folder stand together.
+        // Entries are sorted, so those below one child folder are adjacent.
         names.filter(move |name| last.replace(*name) != Some(*name))
     }
 
-    /// The names of all files in a folder and in those in it, from that folder.
+    /// Paths of all files below a folder, relative to it.
     fn below(&self, folder: &Path) -> impl Iterator<Item = &str> {
         let start = plain(folder).map(|name| if name.is_empty() { name } else { name + "/" });
         start.into_iter().flat_map(|start| {
@@ -253,11 +254,11 @@ impl Archive {
         self.entries.get(&plain(name)?)
     }
 
-    /// Unpacks a file of at most so many bytes.
+    /// Unpacks a file of at most `most` bytes.
     ///
     /// # Errors
-    /// Those of the system, with an [`ArchiveFault`] as the inner error where the archive is at fault; what is larger is an
-    /// error of the kind [`ErrorKind::FileTooLarge`].
+    /// Those of the system, with an [`ArchiveFault`] as the inner error where the archive is at fault; a larger file is an error
+    /// of the kind [`ErrorKind::FileTooLarge`].
     pub fn read(&self, name: &Path, most: u64) -> io::Result<Vec<u8>> {
         let entry = self.entry(name).ok_or(ErrorKind::NotFound)?;
         let length = entry.length();
@@ -276,7 +277,7 @@ impl Archive {
                 return Err(ArchiveFault::Method(name).into());
             }
         };
-        // Of an entry that lies about its length no more is unpacked than tells so.
+        // One byte more than the stated length is enough to detect an entry that lies about it.
         let mut checked = found.verifying_reader(packed.take(length.saturating_add(1)));
         let mut bytes = Vec::new();
         bytes.try_reserve_exact(usize::try_from(length).map_or(0, |length| length.saturating_add(1)))?;
@@ -292,9 +293,9 @@ impl Archive {
     }
 }
 
-/// Finds the directory of an archive of so many bytes: behind it there may be a remark, in which another seems to begin.
+/// Locates the directory of an archive of `length` bytes; the comment behind it may contain what looks like another one.
 fn located<R: ReaderAt>(mut reader: R, chunk: &mut [u8], length: u64) -> Result<ZipArchive<R>, rawzip::Error> {
-    /// Directories that are tried; bounds the time.
+    /// Most directories that are tried; bounds the time.
     const TRIES: usize = 16;
     let mut end = length;
     for left in (0..TRIES).rev() {
@@ -310,11 +311,11 @@ fn located<R: ReaderAt>(mut reader: R, chunk: &mut [u8], length: u64) -> Result<
             None => return Err(error),
         }
     }
-    // The last try ends in the loop.
+    // Not reached: the last try returns from the loop.
     Err(rawzip::Error::from(rawzip::ErrorKind::MissingEndOfCentralDirectory))
 }
 
-/// An error as that of the system which it is, or as a fault of the archive.
+/// Returns an error of the system as it is, and any other as a fault of the archive.
 fn told(error: rawzip::Error, fault: impl Fn(String) -> ArchiveFault) -> io::Error {
     match error.into_kind() {
         rawzip::ErrorKind::IO(error) if error.kind() != ErrorKind::UnexpectedEof => error,
@@ -322,21 +323,22 @@ fn told(error: rawzip::Error, fault: impl Fn(String) -> ArchiveFault) -> io::Err
     }
 }
 
-/// What an archive calls a file, as a plain path; `None` of folders and of what leads out of it.
+/// Decodes the name of an entry to a plain path; `None` for folders and for names that lead out of the archive.
 fn name_of(bytes: &[u8]) -> Option<String> {
     let name = letters::of(bytes).replace('\\', "/");
     let is_folder = name.ends_with('/');
     plain(Path::new(name.trim_start_matches('/'))).filter(|name| !is_folder && !name.is_empty())
 }
 
-/// A path in an archive, with `/` between its folders; `None` if it leads out. What other systems take for a drive is a name.
+/// Normalises a path in an archive, with `/` between folders; `None` if it leads out. A drive letter of another system is a
+/// plain name.
 fn plain(path: &Path) -> Option<String> {
     let text = path.to_str()?;
     let text = if MAIN_SEPARATOR == '/' { text.into() } else { text.replace(MAIN_SEPARATOR, "/") };
     let mut parts = Vec::new();
     for (i, part) in text.split('/').enumerate() {
         match part {
-            // From the root on.
+            // An absolute path.
             "" if i == 0 && text.len() > 1 => return None,
             "" | "." => {}
             ".." => _ = parts.pop()?,
@@ -346,7 +348,7 @@ fn plain(path: &Path) -> Option<String> {
     Some(parts.join("/"))
 }
 
-/// A text that goes on behind a colon.
+/// Lower-cases the first letter of a text that follows a colon.
 fn lower(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())

@@ -1,4 +1,4 @@
-//! Which of the files in an archive is the model.
+//! Choice of the file in an archive that is the model.
 
 use super::{Archive, ArchiveFault};
 use crate::load::detect::{MODELS, is_called_a_model};
@@ -14,14 +14,14 @@ use std::sync::Arc;
 /// A model in an archive.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Offered<'a> {
-    /// Its file, with `/` between folders.
+    /// Path of its file, with `/` between folders.
     pub name: &'a str,
-    /// Files beside it with the same name but for the extension: the same in other formats.
+    /// Files beside it that differ only in the extension: the same model in other formats.
     pub others: Vec<&'a str>,
 }
 
 impl Offered<'_> {
-    /// That these are not drawn, as a message about the archive.
+    /// Diagnostic about the archive that the other formats are not drawn; `None` if there are none.
     pub fn note(&self, archive: &Path) -> Option<Diagnostic> {
         let first = self.others.first()?;
         let more = if self.others.len() > 1 { format!(" and {} more", self.others.len() - 1) } else { String::new() };
@@ -31,14 +31,14 @@ impl Offered<'_> {
     }
 }
 
-/// Whether a file has the name of a zip archive.
+/// Returns whether a file has the extension of a zip archive.
 pub fn is_called_an_archive(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zip"))
 }
 
 impl Archive {
-    /// The models in a folder of it and in those in that, in order, each in one format; what is hidden is none, nor what a Mac
-    /// has put beside each file.
+    /// Returns the models below a folder, in order, each in one format; hidden files are skipped, and the companion files that
+    /// macOS adds.
     pub fn models(&self, folder: &Path) -> Vec<Offered<'_>> {
         let files = self.below(folder).filter(|name| is_shown(name) && is_called_a_model(Path::new(name)));
         let mut by_stem: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
@@ -57,44 +57,44 @@ impl Archive {
 }
 
 impl Archive {
-    /// The only archive in one without models.
+    /// Name of the only inner archive, in an archive that has no models.
     fn only_archive(&self) -> Option<&str> {
         let mut inner = self.archives();
         let only = inner.next().filter(|_| inner.next().is_none())?;
         self.models(Path::new("")).is_empty().then_some(only)
     }
 
-    /// Whether it stands for one model.
+    /// Returns whether the archive can be loaded without naming a model.
     pub fn is_one_model(&self) -> bool {
         self.only_archive().is_some() || self.models(Path::new("")).len() == 1
     }
 
-    /// The archives in it.
+    /// Names of the archives in the archive.
     fn archives(&self) -> impl Iterator<Item = &str> {
         let names = self.entries.keys().map(String::as_str);
         names.filter(|name| is_shown(name) && is_called_an_archive(Path::new(name)))
     }
 }
 
-/// Whether a file in an archive is there for its users.
+/// Returns whether a file in an archive is meant for users: neither hidden nor added by macOS.
 fn is_shown(name: &str) -> bool {
     name.split('/').all(|part| !part.starts_with('.') && part != "__MACOSX")
 }
 
-/// The model of an archive: the only one there, or in the only archive that it has in place of models, as where what somebody
-/// once packed was packed with a licence.
+/// Reads the only model of an archive, or that of its only inner archive if there are no models, as when a packed model was
+/// packed again together with a licence.
 pub(in crate::load) fn only_model(archive: Arc<Archive>, limits: &Limits) -> Result<Source, LoadError> {
     if let Some(inner) = archive.only_archive() {
         let path = archive.path_of(inner);
         let inner = source(archive.clone(), Path::new(inner), limits)?;
         let inner = Archive::from_bytes(&path, inner.bytes).map_err(|error| unreadable(error, &path))?;
-        // No further: an archive may hold itself.
+        // One level only: an archive may contain itself.
         return model_of(Arc::new(inner), limits);
     }
     model_of(archive, limits)
 }
 
-/// The only model of an archive itself.
+/// Reads the only model that lies in the archive itself.
 fn model_of(archive: Arc<Archive>, limits: &Limits) -> Result<Source, LoadError> {
     let models = archive.models(Path::new(""));
     let [Offered { name, .. }] = &models[..] else { return Err(none_or_several(&archive, &models).into()) };
@@ -102,7 +102,7 @@ fn model_of(archive: Arc<Archive>, limits: &Limits) -> Result<Source, LoadError>
     Ok(Source { note, ..source(archive, &name, limits)? })
 }
 
-/// The model of an archive that is named.
+/// Reads the model of an archive that has this name.
 pub(in crate::load) fn named_model(archive: Arc<Archive>, name: &Path, limits: &Limits) -> Result<Source, LoadError> {
     if archive.has(name) {
         return source(archive, name, limits);
@@ -125,7 +125,7 @@ pub(in crate::load) fn named_model(archive: Arc<Archive>, name: &Path, limits: &
     Err(Diagnostic::new(FileFault::MISSING, path, "", "is not in the archive").remedy(remedy).into())
 }
 
-/// A file in an archive, in memory.
+/// Reads a file of an archive into memory.
 pub(in crate::load) fn source(archive: Arc<Archive>, name: &Path, limits: &Limits) -> Result<Source, LoadError> {
     let path = archive.path.join(name);
     match archive.read(name, limits.file) {
@@ -137,7 +137,7 @@ pub(in crate::load) fn source(archive: Arc<Archive>, name: &Path, limits: &Limit
     }
 }
 
-/// Why a model or an archive that was named cannot be read.
+/// Error for a named model or archive that cannot be read.
 pub(in crate::load) fn unreadable(error: io::Error, path: &Path) -> LoadError {
     if let Some(fault) = ArchiveFault::of(&error) {
         return fault.diagnose(path).into();
@@ -145,9 +145,9 @@ pub(in crate::load) fn unreadable(error: io::Error, path: &Path) -> LoadError {
     LoadError::Read { what: Box::new(Diagnostic::new("file-unreadable", path, "", "cannot be read")), source: error }
 }
 
-/// What is told where it is not clear which model of an archive is meant, and of one without any.
+/// Diagnostic for an archive with several models, or with none.
 fn none_or_several(archive: &Archive, models: &[Offered]) -> Diagnostic {
-    /// So many are told.
+    /// Most names that are listed.
     const TOLD: usize = 4;
     let list = |names: &mut dyn Iterator<Item = &str>| {
         names.take(TOLD).map(|name| format!("'{}'", shorten(name))).collect::<Vec<_>>().join(", ")

@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
-/// By what it is known that a file is the same still: its length, when it was changed, and which it is on its disk, where that
-/// can be asked.
+/// What identifies an unchanged file: its length, its time of modification and, on Unix, its inode number.
 type Stamp = (u64, Option<SystemTime>, u64);
 
 fn stamp(metadata: &Metadata) -> Stamp {
@@ -19,10 +18,10 @@ fn stamp(metadata: &Metadata) -> Stamp {
     (metadata.len(), metadata.modified().ok(), file)
 }
 
-/// The archive that was looked into last: models of one archive are mostly read one after the other.
+/// The archive opened last: models of one archive are mostly read one after the other.
 static LAST: Mutex<Option<(PathBuf, Stamp, Arc<Archive>)>> = Mutex::new(None);
 
-/// Looks into an archive on disk, if that was not done just before; `None` if that file is none.
+/// Opens an archive on disk, or returns it if it was the last one opened; `None` if the file is not an archive.
 ///
 /// # Errors
 /// Those of [`Archive::open`].
@@ -31,7 +30,7 @@ pub(crate) fn opened(path: &Path) -> io::Result<Option<Arc<Archive>>> {
         return Ok(None);
     }
     let stamp = stamp(&path.metadata()?);
-    // Others that want the same wait for it.
+    // Held while opening, so that threads that want the same archive wait for it.
     let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, _, archive)) = last.as_ref().filter(|(known, then, _)| known == path && *then == stamp) {
         return Ok(Some(archive.clone()));
@@ -41,14 +40,14 @@ pub(crate) fn opened(path: &Path) -> io::Result<Option<Arc<Archive>>> {
     Ok(Some(archive))
 }
 
-/// The path of a plain file that a path goes through as if it were a folder, and the rest of it.
+/// Splits a path that runs through a plain file as if it were a folder into that file and the rest.
 pub(crate) fn split(path: &Path) -> Option<(&Path, &Path)> {
     let above = path.ancestors().find(|above| above.metadata().is_ok())?;
     let rest = path.strip_prefix(above).ok()?;
     (above.is_file() && above != path).then_some((above, rest))
 }
 
-/// The archive that a path leads into, and the path in it; `None` if it leads into none.
+/// The archive that a path leads into, and the rest of the path; `None` if it leads into none.
 ///
 /// # Errors
 /// Those of [`Archive::open`].

@@ -10,7 +10,7 @@ use rawzip::ZipArchiveWriter;
 use std::fs;
 use std::io::Write;
 
-/// A zip archive of files by name; those whose names end in `.bin` are stored as they are.
+/// Builds a zip archive of named files; those whose names end in `.bin` are stored uncompressed.
 fn zip(files: &[(&str, &[u8])]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut archive = ZipArchiveWriter::new(&mut bytes);
@@ -42,7 +42,7 @@ fn of_bytes(files: &[(&str, &[u8])]) -> Result<Loaded, LoadError> {
     load_bytes(Path::new("a.zip"), zip(files), &LoadOptions::default())
 }
 
-/// The code and the remedy of what is wrong.
+/// Code and message of the first fault.
 fn fault(loaded: Result<Loaded, LoadError>) -> (&'static str, String) {
     match loaded {
         Err(LoadError::Input(faults)) => (faults[0].code, faults[0].to_string()),
@@ -66,7 +66,7 @@ fn the_only_model_of_an_archive_is_loaded_with_what_it_names() {
     let loaded = of_bytes(&files).unwrap();
     assert_eq!((loaded.scene.prims(), loaded.warnings.len()), (1, 0), "{:?}", loaded.warnings);
     assert_eq!(names(&loaded), ["a.zip/house/house.obj", "a.zip/house/paint.mtl"]);
-    // The same as unpacked.
+    // The hash is that of the unpacked files.
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join("house.obj"), OBJ).unwrap();
     fs::write(dir.path().join("paint.mtl"), MTL).unwrap();
@@ -102,7 +102,7 @@ fn what_a_model_names_is_looked_for_in_its_archive_and_nowhere_else() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     fs::write(at("paint.mtl"), MTL).unwrap();
-    // Above the model, in another case, with backslashes and a folder of another machine.
+    // Through a parent folder, in another case, with backslashes, and in a folder of another machine.
     for (library, found) in [
         ("../lib/paint.mtl", true),
         ("..\\LIB\\Paint.MTL", true),
@@ -210,7 +210,7 @@ fn nothing_leads_out_of_an_archive() {
     assert!(archive.has_folder(Path::new("")) && !archive.has_folder(Path::new("root")));
 }
 
-/// An archive of files, stored as they are, under names that are written as they are given.
+/// Builds an archive of uncompressed files whose names are written verbatim.
 fn zip_verbatim(files: &[(&[u8], &[u8])]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut archive = ZipArchiveWriter::new(&mut bytes);
@@ -237,7 +237,7 @@ fn a_spoiled_file_is_told_and_none_is_unpacked_to_more_than_it_says() {
     let archive = Archive::from_bytes(Path::new("a.zip"), whole.clone()).unwrap();
     assert_eq!(archive.read(Path::new("long.txt"), 99_999).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
     assert_eq!(archive.share(), 100_015);
-    // A letter of what is stored.
+    // Change a byte of the stored data.
     let at = whole.windows(6).position(|w| w == b"stored").unwrap();
     let mut spoiled = whole.clone();
     spoiled[at] = b'S';
@@ -246,13 +246,13 @@ fn a_spoiled_file_is_told_and_none_is_unpacked_to_more_than_it_says() {
         matches!(ArchiveFault::of(&error), Some(ArchiveFault::Spoiled(why)) if why.contains("checksum")),
         "{error}"
     );
-    // What the directory says of a length: 100 000 -> 5.
+    // Change the length in the directory from 100 000 to 5.
     let at = whole.windows(4).rposition(|w| w == 100_000_u32.to_le_bytes()).unwrap();
     let mut lying = whole.clone();
     lying[at..at + 4].copy_from_slice(&5_u32.to_le_bytes());
     let error = read(lying, "long.txt").unwrap_err();
     assert!(matches!(ArchiveFault::of(&error), Some(ArchiveFault::Spoiled(_))), "{error}");
-    // The flags and the method of the first entry of the directory.
+    // Flags and method of the first entry in the directory.
     let at = whole.windows(4).position(|w| w == b"PK\x01\x02").unwrap();
     for (offset, value, expected) in [
         (8, 1, "it is encrypted"),

@@ -1,8 +1,8 @@
 //! Reads accessors: every component type, normalised or not, interleaved, sparse, decoded from a compressed primitive, or
 //! without a view (zeros).
 //!
-//! Sizes have been checked against the views by [`super::links`] where the file declares them; here every byte is
-//! looked up with bounds, so that a buffer shorter than declared ends in a message.
+//! [`super::links`] has checked declared sizes against the views; here every read is bounds-checked, so that a buffer shorter
+//! than declared ends in a diagnostic.
 
 use super::buffers::Buffers;
 use super::draco::Decoded;
@@ -22,21 +22,21 @@ pub(super) struct Reader<'a> {
     pub(super) decoded: &'a Decoded,
 }
 
-/// Which elements of an accessor to read.
+/// Elements of an accessor to read.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Pick<'a> {
     All,
-    /// These, ascending and each once.
+    /// The elements with these indices, ascending and distinct.
     Only(&'a [u32]),
 }
 
-/// The smallest and largest value of up to 16 components.
+/// Minimum and maximum of up to 16 components.
 pub(super) type Extent = [(f64, f64); 16];
 
-/// Why an accessor could not be read.
+/// Reason why an accessor could not be read.
 #[derive(Clone, Debug)]
 pub(super) enum Unreadable {
-    /// The file never says where the bytes are.
+    /// The file does not say where the bytes are.
     Nowhere(Diagnostic),
     /// The buffer could not be read.
     Buffer(Diagnostic),
@@ -46,7 +46,7 @@ pub(super) enum Unreadable {
     Unknown,
 }
 
-/// How the elements of an accessor lie in memory.
+/// Component type and shape of an accessor's elements.
 #[derive(Clone, Copy)]
 pub(super) struct Format {
     pub(super) component: ComponentType,
@@ -55,7 +55,7 @@ pub(super) struct Format {
 }
 
 impl Format {
-    /// The format of an accessor; `None` for types that glTF 2.0 does not know.
+    /// Returns the format of an accessor; `None` for types that glTF 2.0 does not know.
     pub(super) fn of(accessor: &Accessor) -> Option<Self> {
         let (Checked::Valid(component), Checked::Valid(shape)) = (accessor.component_type, accessor.type_) else {
             return None;
@@ -63,7 +63,7 @@ impl Format {
         Some(Self { component: component.0, shape, normalized: accessor.normalized })
     }
 
-    /// Number of components.
+    /// Number of components per element.
     pub(super) fn width(self) -> usize {
         self.shape.multiplicity()
     }
@@ -73,7 +73,7 @@ impl Format {
         self.component.size()
     }
 
-    /// Where component `k` lies in an element: columns of matrices start at multiples of four bytes.
+    /// Byte offset of component `k` in an element: columns of matrices start at multiples of four bytes.
     fn offset(self, k: usize) -> usize {
         let rows = self.rows();
         (k / rows) * self.column_size() + (k % rows) * self.component_size()
@@ -97,13 +97,13 @@ impl Format {
         if self.is_matrix() { size.next_multiple_of(4) } else { size }
     }
 
-    /// Bytes of one element, packed.
+    /// Bytes of one packed element, with the padding between matrix columns.
     pub(super) fn size(self) -> usize {
         self.width() / self.rows() * self.column_size()
     }
 }
 
-/// Where a run of elements lies.
+/// Location of consecutive elements in memory.
 pub(super) struct Run<'a> {
     bytes: &'a [u8],
     stride: usize,
@@ -111,7 +111,7 @@ pub(super) struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Elements one after the other, from byte `offset` of a view on.
+    /// Returns the packed elements from byte `offset` of a view on.
     pub(super) fn packed(
         buffers: &'a Buffers,
         view: Index<buffer::View>,
@@ -127,23 +127,23 @@ impl<'a> Run<'a> {
         Ok(Self { bytes: bytes.get(offset..).unwrap_or_default(), stride: format.size(), format })
     }
 
-    /// This run with the stride that the view says.
+    /// Applies the stride of the view, if it declares one.
     fn strided(self, root: &Root, view: Index<buffer::View>) -> Self {
         let stride = root.buffer_views.get(view.value()).and_then(|view| view.byte_stride).map_or(0, |s| s.0);
         Self { stride: if stride > 0 { stride } else { self.stride }, ..self }
     }
 
-    /// The bytes of element `i`, if they are all there.
+    /// Bytes of element `i`; `None` if the data ends before its end.
     fn element(&self, i: usize) -> Option<&'a [u8]> {
         self.bytes.get(i.checked_mul(self.stride)?..)?.get(..self.format.size())
     }
 
-    /// The elements, each with at least the bytes it needs.
+    /// Bytes of the first `count` elements, each complete; ends early where the data does.
     pub(super) fn elements(&self, count: usize) -> impl Iterator<Item = &'a [u8]> {
         (0..count).map_while(|i| self.element(i))
     }
 
-    /// How many whole elements there are.
+    /// Number of complete elements.
     fn len(&self) -> usize {
         let rest = self.bytes.len().checked_sub(self.format.size());
         rest.map_or(0, |rest| rest / self.stride.max(1) + 1)
@@ -151,7 +151,7 @@ impl<'a> Run<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Reads floats, `N` to an element; integers are normalised when the accessor says so.
+    /// Reads elements of `N` floats; integers are normalised when the accessor says so.
     pub(super) fn floats<const N: usize>(
         &self,
         index: Index<Accessor>,
@@ -169,7 +169,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Reads scalars or vectors of unsigned integers.
+    /// Reads elements of `N` unsigned integers.
     pub(super) fn integers<const N: usize>(
         &self,
         index: Index<Accessor>,
@@ -180,7 +180,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Reads scalars of unsigned integers, all of them.
+    /// Reads all elements as unsigned scalars.
     pub(super) fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, Unreadable> {
         if let Some(decoded) = self.decoded.indices(index.value()) {
             return Ok(decoded.to_vec());
@@ -195,7 +195,7 @@ impl<'a> Reader<'a> {
         self.elements(index, Pick::All, 0, |element, format| integer(element, format, 0))
     }
 
-    /// The bytes of all elements of an accessor that lie one after the other, are there, and are of such a format: most are.
+    /// Bytes of all elements, if the accessor is packed, complete, not sparse and of a wanted format: most are.
     fn packed(&self, index: Index<Accessor>, is_wanted: impl Fn(Format) -> bool) -> Option<&'a [u8]> {
         let accessor = self.root.accessors.get(index.value()).filter(|accessor| accessor.sparse.is_none())?;
         let format = Format::of(accessor).filter(|format| is_wanted(*format))?;
@@ -204,25 +204,25 @@ impl<'a> Reader<'a> {
         run.bytes.get(..bytes).filter(|_| run.stride == format.size())
     }
 
-    /// How many elements an accessor has: as many as were decoded, or it declares.
+    /// Number of elements of an accessor: those decoded, or else those declared.
     pub(super) fn count(&self, index: Index<Accessor>) -> u64 {
         let declared = || self.root.accessors.get(index.value()).map_or(0, |accessor| accessor.count.0);
         self.decoded.count(index.value()).unwrap_or_else(declared)
     }
 
-    /// Whether an accessor holds only zeros, because the file has nothing for it.
+    /// Returns whether all elements are zero because the file stores no data for the accessor.
     pub(super) fn is_blank(&self, index: Index<Accessor>) -> bool {
         let accessor = self.root.accessors.get(index.value());
         let nowhere = accessor.is_some_and(|a| a.buffer_view.is_none() && a.sparse.is_none());
         nowhere && self.decoded.count(index.value()).is_none()
     }
 
-    /// The smallest and largest value of each component, not normalised, numbers that are not finite left out.
+    /// Returns the minimum and maximum of each component, not normalised; non-finite numbers are skipped.
     ///
-    /// Small sparse accessors are read whole; `None` for large ones, for those that hold only zeros, and for those of
-    /// compressed primitives: their bounds are those from before the compression, which moves vertices a little.
+    /// Small sparse accessors are read whole; `None` for large ones, for those without data, and for those of compressed
+    /// primitives: their bounds date from before compression, which moves vertices slightly.
     pub(super) fn extent(&self, index: Index<Accessor>) -> Option<Result<Extent, Unreadable>> {
-        /// Elements of a sparse accessor worth reading only to be checked.
+        /// Most elements of a sparse accessor that are read only to check bounds.
         const SMALL: u64 = 1 << 16;
         let accessor = self.root.accessors.get(index.value())?;
         let format = Format::of(accessor)?;
@@ -264,7 +264,7 @@ impl<'a> Reader<'a> {
         let mut values = match self.run(index, accessor, format)? {
             Some(run) => {
                 let read = |element| read(element, format);
-                // There is a byte for each at least, so that so many fit.
+                // Each element takes at least a byte, which bounds the capacity.
                 let mut values: Vec<T> = Vec::with_capacity(wanted.min(run.len()));
                 match pick {
                     Pick::All => values.extend(run.elements(count).map(read)),
@@ -291,7 +291,7 @@ impl<'a> Reader<'a> {
         Ok(values)
     }
 
-    /// Where the elements of an accessor lie; `None`: nowhere, they are zeros.
+    /// Location of the elements of an accessor; `None` if they are not stored and thus zero.
     fn run(&self, index: Index<Accessor>, accessor: &Accessor, format: Format) -> Result<Option<Run<'a>>, Unreadable> {
         if let Some(bytes) = self.decoded.values(index.value()) {
             return Ok(Some(Run { bytes, stride: format.size(), format }));
@@ -305,7 +305,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The replaced elements among those that are read, and where each stands among these.
+/// Replaced elements among those that are read, each with its index in the result.
 fn hits<'a>(replaced: &'a [Replaced], pick: Pick<'a>) -> impl Iterator<Item = (usize, &'a Replaced)> {
     let (list, all) = match pick {
         Pick::All => (&[][..], replaced),
@@ -321,25 +321,25 @@ fn short(count: usize, found: usize) -> Unreadable {
     Unreadable::Data(super::codes::Code::AccessorTooLong, text)
 }
 
-/// The floats of an element that holds just `N`, one after the other: nearly all of them.
+/// Floats of an element that is exactly `N` packed floats, as nearly all are.
 #[inline(always)]
 fn stored<const N: usize>(element: &[u8], format: Format) -> Option<[f32; N]> {
     let floats = element.as_chunks::<4>().0.first_chunk::<N>().filter(|_| is_floats::<N>(format))?;
     Some(floats.map(f32::from_le_bytes))
 }
 
-/// Whether elements are `N` floats, one after the other.
+/// Returns whether elements are `N` packed floats.
 #[inline(always)]
 fn is_floats<const N: usize>(format: Format) -> bool {
     format.component == ComponentType::F32 && !format.is_matrix() && format.width() == N
 }
 
-/// `N` bytes of an element; zeros past its end, where nobody reads.
+/// Reads `N` bytes of an element; zeros past its end, which valid formats never reach.
 fn bytes<const N: usize>(element: &[u8], at: usize) -> [u8; N] {
     element.get(at..at + N).and_then(|b| b.try_into().ok()).unwrap_or([0; N])
 }
 
-/// Component `k` as a float, by the conversions of glTF 2.0 §3.11.
+/// Component `k` as a float, converted as in glTF 2.0 §3.11.
 fn float(element: &[u8], format: Format, k: usize) -> f32 {
     let at = format.offset(k);
     let scale = |value: f32, largest: f32| if format.normalized { (value / largest).max(-1.0) } else { value };
@@ -353,12 +353,12 @@ fn float(element: &[u8], format: Format, k: usize) -> f32 {
     }
 }
 
-/// All components as stored.
+/// All components as stored, not normalised.
 fn raws(element: &[u8], format: Format) -> [f64; 16] {
     std::array::from_fn(|k| if k < format.width() { raw(element, format, k) } else { 0.0 })
 }
 
-/// How far numbers of elements reach, those that are finite.
+/// Minimum and maximum of each component; non-finite numbers are skipped.
 fn extent_of(elements: impl Iterator<Item = [f64; 16]>, format: Format) -> Extent {
     let mut extent = [(f64::INFINITY, f64::NEG_INFINITY); 16];
     for element in elements {
@@ -369,10 +369,10 @@ fn extent_of(elements: impl Iterator<Item = [f64; 16]>, format: Format) -> Exten
     extent
 }
 
-/// As [`extent_of`] has it, of vectors of three floats; `None`: they are none, or have numbers that are not finite.
+/// Fast path of [`extent_of`] for vectors of three floats; `None` for other formats and if any number is not finite.
 fn extent_of_vectors(mut vectors: impl Iterator<Item = Option<[f32; 3]>>) -> Option<Extent> {
     let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    // Products with 0 tell what is not finite.
+    // Products with 0 are NaN for non-finite numbers.
     let mut zero = Vec3::ZERO;
     vectors.try_for_each(|vector| {
         let v = Vec3::from(vector?);
@@ -386,7 +386,7 @@ fn extent_of_vectors(mut vectors: impl Iterator<Item = Option<[f32; 3]>>) -> Opt
     (zero == Vec3::ZERO).then_some(extent)
 }
 
-/// Component `k` as stored.
+/// Component `k` as stored, not normalised.
 fn raw(element: &[u8], format: Format, k: usize) -> f64 {
     match format.component {
         ComponentType::U32 => f64::from(integer(element, format, k)),
@@ -394,7 +394,7 @@ fn raw(element: &[u8], format: Format, k: usize) -> f64 {
     }
 }
 
-/// Component `k` as an unsigned integer; signed and floating ones are not indices and give zero.
+/// Component `k` as an unsigned integer; zero for signed and floating-point components, which are not indices.
 pub(super) fn integer(element: &[u8], format: Format, k: usize) -> u32 {
     let at = format.offset(k);
     match format.component {

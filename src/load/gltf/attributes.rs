@@ -1,6 +1,6 @@
-//! What the primitives of meshes say about their accessors, checked before any data is read.
+//! Checks what the primitives of meshes declare about their accessors, before any data is read.
 //!
-//! Looks at the JSON itself: the typed document knows only attribute names that mean something.
+//! Works on the JSON: the typed document keeps only attribute names that it knows.
 
 use super::codes::Code;
 use super::document::is_semantic;
@@ -10,7 +10,7 @@ use super::tree::{Map, Value};
 use super::variants;
 use std::collections::HashMap;
 
-/// Types of components (glTF 2.0, §3.6.2.2).
+/// Component types (glTF 2.0, §3.6.2.2).
 const BYTE: u64 = 5120;
 const UNSIGNED_BYTE: u64 = 5121;
 const SHORT: u64 = 5122;
@@ -18,11 +18,11 @@ const UNSIGNED_SHORT: u64 = 5123;
 const UNSIGNED_INT: u64 = 5125;
 const FLOAT: u64 = 5126;
 
-/// What views hold (§5.11.5): vertices, or their numbers.
+/// Targets of buffer views (§5.11.5): vertex attributes and vertex indices.
 const ARRAY_BUFFER: u64 = 34962;
 const ELEMENT_ARRAY_BUFFER: u64 = 34963;
 
-/// Checks every primitive, with the material that it shows in a variant.
+/// Checks every primitive, together with the material that it has in a variant.
 pub(super) fn check(root: &Value, variant: Option<usize>, report: &mut Report) {
     let quantized = list(root, "extensionsUsed").iter().any(|e| e.as_str() == Some("KHR_mesh_quantization"));
     let mut check = Check { root, variant, quantized, views: HashMap::new(), maps: HashMap::new(), report };
@@ -44,7 +44,7 @@ pub(super) fn check(root: &Value, variant: Option<usize>, report: &mut Report) {
     }
 }
 
-/// An accessor as far as a primitive cares.
+/// Properties of an accessor that matter to a primitive.
 struct Shape<'a> {
     index: u64,
     component: u64,
@@ -56,21 +56,21 @@ struct Shape<'a> {
     bounded: bool,
 }
 
-/// Maps of one material that are laid out by the same texture coordinates.
+/// Maps of one material that share a set of texture coordinates.
 struct Layout<'a> {
-    /// `TEXCOORD_1`.
+    /// Name of the attribute, such as `TEXCOORD_1`.
     coordinates: String,
     names: Vec<&'a str>,
 }
 
 struct Check<'a> {
     root: &'a Value<'a>,
-    /// The variant of materials that is asked for.
+    /// Index of the requested material variant.
     variant: Option<usize>,
     quantized: bool,
-    /// The attribute that came first in each buffer view.
+    /// Accessor of the first attribute in each buffer view.
     views: HashMap<usize, u64>,
-    /// What the maps of each material need, as far as somebody asked.
+    /// Texture coordinates that the maps of each material need, filled on demand.
     maps: HashMap<usize, Vec<Layout<'a>>>,
     report: &'a mut Report,
 }
@@ -100,7 +100,7 @@ impl<'a> Check<'a> {
             self.attribute(name, &shape, &place, false);
             match vertices {
                 None => vertices = Some(shape.count),
-                // Of compressed values the stream says how many there are.
+                // For compressed attributes the stream decides the count.
                 Some(count) if count != shape.count && !is_compressed => {
                     let text = format!("{} elements for {count} vertices", shape.count);
                     self.report.add(Code::MeshPrimitiveUnequalAccessorCount, place, text);
@@ -117,7 +117,7 @@ impl<'a> Check<'a> {
         self.material(primitive, attributes, place);
     }
 
-    /// Numbered sets must be 0, 1, 2, …, and joints go with weights.
+    /// Numbered sets must be 0, 1, 2, …, and joints need as many sets as weights.
     fn sets(&mut self, attributes: &Map, at: &str) {
         let mut counts = Vec::new();
         for prefix in ["TEXCOORD_", "COLOR_", "JOINTS_", "WEIGHTS_"] {
@@ -163,7 +163,7 @@ impl<'a> Check<'a> {
         }
         let norm = if shape.normalized { ", normalized" } else { "" };
         let text = format!("{name} cannot be {} of {}{norm}", shape.kind, component_name(shape.component));
-        // Of other formats nothing can be read; floats that are called normalized are what they are.
+        // Other formats cannot be read; floats marked as normalized can.
         if name == "POSITION" && !morph && shape.kind != "VEC3" {
             self.report.add(Code::MeshPrimitiveAttributesAccessorInvalidFormat, place, text);
         } else {
@@ -171,7 +171,7 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Alignment, stride and target of the view.
+    /// Checks alignment, stride and target of the view.
     fn layout(&mut self, shape: &Shape, place: &str) {
         let Some((index, view)) = shape.view else { return };
         let stride = view.get("byteStride").and_then(whole);
@@ -194,7 +194,7 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Checks the indices and says how many there are.
+    /// Checks the indices and returns their count.
     fn indices(&mut self, primitive: &'a Value<'a>, place: &str) -> Option<u64> {
         let place = format!("{place}.indices");
         let shape = self.shape(primitive.get("indices")?)?;
@@ -258,13 +258,13 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Whether the primitive has what its material's maps need.
+    /// Checks that the primitive has the attributes that its material needs.
     fn material(&mut self, primitive: &Value, attributes: &Map, place: &str) {
         let place = format!("{place}.material");
         let index = variants::material_in(primitive, self.variant);
         let Some(material) = index.and_then(|i| list(self.root, "materials").get(i)) else { return };
         let layouts = self.maps.entry(index.unwrap_or_default()).or_insert_with(|| layouts(material));
-        // The first that is missing is enough, and bounds the work by the number of attributes.
+        // Reporting only the first missing set bounds the work by the number of attributes.
         if let Some(layout) = layouts.iter().find(|layout| !attributes.contains_key(&layout.coordinates)) {
             let text = format!("the {} of its material needs {}", layout.names.join(", "), layout.coordinates);
             self.report.add(Code::MeshPrimitiveTooFewTexcoords, &place, text);
@@ -312,7 +312,7 @@ impl Shape<'_> {
     }
 }
 
-/// How an attribute's format stands to the rules.
+/// Conformance of an attribute's format.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Fit {
     /// glTF 2.0 allows it.
@@ -350,9 +350,9 @@ fn fit(name: &str, shape: &Shape, morph: bool) -> Fit {
     }
 }
 
-/// The maps of a material by their texture coordinates.
+/// Groups the maps of a material by their texture coordinates.
 fn layouts<'a>(material: &'a Value<'a>) -> Vec<Layout<'a>> {
-    /// Names of maps in one message; materials have no more.
+    /// Most map names in one message; materials have no more.
     const LISTED: usize = 20;
     let mut slots = Vec::new();
     texture_slots(material, &mut slots);
@@ -364,7 +364,7 @@ fn layouts<'a>(material: &'a Value<'a>) -> Vec<Layout<'a>> {
     slots.chunk_by(|a, b| a.1 == b.1).map(layout).collect()
 }
 
-/// Every map of a material, extensions included, with its texture coordinate set.
+/// Collects every map of a material, extensions included, with its texture coordinate set.
 fn texture_slots<'a>(value: &'a Value<'a>, out: &mut Vec<(&'a str, u64)>) {
     for (name, value) in value.as_object().into_iter().flat_map(Map::iter) {
         if name.ends_with("Texture") && value.get("index").is_some() {

@@ -1,6 +1,6 @@
-//! Declared bounds of accessors against their data.
+//! Compares the declared bounds of accessors with their data.
 //!
-//! Nothing is drawn from declared bounds; that they are wrong is a sign that the data is.
+//! Rendering does not use declared bounds; wrong ones are a sign of wrong data.
 
 use super::accessor::{Extent, Format, Reader, Unreadable};
 use super::codes::Code;
@@ -10,16 +10,16 @@ use gltf::json::accessor::Accessor;
 use rayon::prelude::*;
 use serde_json::Value;
 
-/// Rounding to six digits, as many exporters write bounds, relative to the value or to 1.
+/// Tolerance, relative to the value or to 1: many exporters round bounds to six digits.
 const ROUNDED: f64 = 1e-5;
 
-/// Bytes that are read in any case, besides twice those of the buffers.
+/// Bytes that may always be read, in addition to twice the size of the buffers.
 const FREE: u64 = 1 << 28;
 
-/// Checks the accessors that declare bounds, and sparse ones.
+/// Checks accessors that declare bounds, and sparse ones.
 ///
-/// Accessors may lie over each other, so that a small file declares any amount of data: only as much is read as files
-/// have that are not made for this.
+/// Accessors may overlap, so that a small file can declare any amount of data: the bytes read are limited to what ordinary files
+/// have.
 pub(super) fn check(reader: Reader, report: &mut Report) {
     let mut left = (reader.buffers.len() + reader.decoded.len()).saturating_mul(2).saturating_add(FREE);
     let affordable = |accessor: &Accessor| {
@@ -43,7 +43,7 @@ pub(super) fn check(reader: Reader, report: &mut Report) {
                 compare(&extent, accessor.max.as_ref(), true, &place, report);
             }
             Some(Err(Unreadable::Data(code, text))) => report.add(code, place, text),
-            // Whoever needs the data tells of it.
+            // Reported by whoever needs the data.
             Some(Err(_)) | None => {}
         }
     }

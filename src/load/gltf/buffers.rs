@@ -1,4 +1,4 @@
-//! The bytes that buffers and buffer views stand for.
+//! Bytes of buffers and buffer views.
 
 use super::codes::Code;
 use super::meshopt::{self, Decoded};
@@ -16,25 +16,25 @@ use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// The bytes of every buffer, or why they are not there.
+/// Bytes of every buffer, or the reason why they are missing.
 pub(super) struct Buffers<'a> {
     root: &'a Root,
     slots: Vec<Slot<'a>>,
-    /// What compressed views hold.
+    /// Contents of compressed views, decoded.
     decoded: Decoded,
 }
 
 enum Slot<'a> {
     Bytes(Cow<'a, [u8]>),
-    /// Those of another buffer, which names the same file.
+    /// The bytes of another buffer that names the same file; its index.
     Same(usize),
-    /// Nothing says where the bytes are, which the format allows; whatever needs them is left out.
+    /// The file does not say where the bytes are, which the format allows; whatever needs them is left out.
     Nowhere(Diagnostic),
     Failed(Diagnostic),
 }
 
 impl<'a> Buffers<'a> {
-    /// Finds all buffers, and decodes compressed views. One that cannot be read is a warning until something needs it.
+    /// Reads all buffers and decodes compressed views. An unreadable buffer is a warning until something needs it.
     pub(super) fn load(
         root: &'a Root,
         bin: Option<&'a [u8]>,
@@ -55,7 +55,7 @@ impl<'a> Buffers<'a> {
                 Some(&other) => Slot::Same(other),
                 None => find.one(i, buffer),
             };
-            // What was looked for once is not looked for again, found or not.
+            // Each name is looked up only once, found or not.
             let named = named.filter(|_| !stand_ins.contains(&i));
             named.into_iter().for_each(|uri| _ = known.entry(uri).or_insert(i));
             buffers.slots.push(slot);
@@ -70,7 +70,7 @@ impl<'a> Buffers<'a> {
         buffers
     }
 
-    /// Puts the bytes that the file has uncompressed in place of those that could not be decoded.
+    /// Replaces views that could not be decoded by the uncompressed fallback in the file.
     fn stand_in(&mut self, stand_ins: &HashSet<usize>, find: &mut Find<'a, '_>) {
         let mut failed: Vec<usize> = self.decoded.iter().filter(|(_, bytes)| bytes.is_err()).map(|(i, _)| *i).collect();
         failed.sort_unstable();
@@ -89,7 +89,7 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    /// Bytes of all buffers, each file counted once, and of what was decoded from them.
+    /// Bytes of all buffers, each file counted once, and of all decoded views.
     pub(super) fn len(&self) -> u64 {
         let bytes = |slot: &Slot| if let Slot::Bytes(bytes) = slot { bytes.len() as u64 } else { 0 };
         let decoded = self.decoded.values().flatten().map(|bytes| bytes.len() as u64);
@@ -110,10 +110,10 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    /// The bytes of a view, decoded if they are compressed, as far as they are there.
+    /// Bytes of a view, decoded if compressed, as far as they exist.
     ///
     /// # Errors
-    /// Why there are none. `None`: the file never says where they are.
+    /// The reason why there are none; `None` if the file does not say where they are.
     pub(super) fn view(&self, index: Index<buffer::View>) -> Result<&[u8], Option<Diagnostic>> {
         match self.decoded.get(&index.value()) {
             Some(decoded) => decoded.as_deref().map_err(|why| Some(why.clone())),
@@ -121,7 +121,7 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    /// The bytes of a view as they lie in its buffer.
+    /// Bytes of a view as stored in its buffer.
     fn plain(&self, view: &buffer::View) -> Result<&[u8], Option<Diagnostic>> {
         let bytes = self.buffer(view.buffer.value())?;
         let offset = clamp(view.byte_offset.unwrap_or_default().0, bytes.len());
@@ -129,10 +129,10 @@ impl<'a> Buffers<'a> {
         Ok(&bytes[offset..offset + length])
     }
 
-    /// The bytes of a buffer, not past its declared length even where the data goes on.
+    /// Bytes of a buffer, at most its declared length.
     ///
     /// # Errors
-    /// Why there are none. `None`: the file never says where they are.
+    /// The reason why there are none; `None` if the file does not say where they are.
     pub(super) fn buffer(&self, i: usize) -> Result<&[u8], Option<Diagnostic>> {
         let bytes = match self.slot(i) {
             Some(Slot::Bytes(bytes)) => bytes,
@@ -143,7 +143,7 @@ impl<'a> Buffers<'a> {
         Ok(&bytes[..clamp(declared, bytes.len())])
     }
 
-    /// Tells of buffers that nothing says the whereabouts of; for whoever needs one.
+    /// Diagnostic for a view whose buffer has no stated location; `None` for other views.
     pub(super) fn nowhere(&self, index: Index<buffer::View>) -> Option<Diagnostic> {
         match self.slots.get(self.root.buffer_views.get(index.value())?.buffer.value()) {
             Some(Slot::Nowhere(why)) => Some(why.clone()),
@@ -152,7 +152,7 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// Buffers that are read only when a compressed view cannot be decoded.
+/// Indices of fallback buffers, which are read only when a compressed view cannot be decoded.
 fn stand_ins(root: &Root) -> HashSet<usize> {
     let declared = root.buffers.iter().enumerate().filter(|(_, buffer)| meshopt::is_stand_in(buffer));
     let mut found: HashSet<usize> = declared.map(|(i, _)| i).collect();
@@ -161,12 +161,12 @@ fn stand_ins(root: &Root) -> HashSet<usize> {
     found
 }
 
-/// The smaller one, as a position in memory.
+/// Minimum of both, as `usize`.
 fn clamp(wanted: u64, end: usize) -> usize {
     usize::try_from(wanted).map_or(end, |wanted| wanted.min(end))
 }
 
-/// Where the bytes of buffers are looked for.
+/// Sources of buffers' bytes.
 struct Find<'a, 'b> {
     bin: Option<&'a [u8]>,
     files: Reader<'b>,
@@ -185,7 +185,7 @@ impl<'a> Find<'a, '_> {
         }
     }
 
-    /// A buffer whose bytes nobody has asked for.
+    /// Slot of a buffer without a stated location, or of a fallback buffer that is not needed yet.
     fn nowhere(&self, i: usize) -> Slot<'a> {
         let text = "nothing says where its bytes are; what needs them is left out";
         Slot::Nowhere(Diagnostic::new("gltf-buffer-nowhere", self.files.file, format!("buffers[{i}]"), text))
@@ -197,7 +197,7 @@ impl<'a> Find<'a, '_> {
             let text = format!("a data URI of type '{}' where bytes should be", shorten(kind));
             self.report.add(Code::BufferDataUriMimeTypeInvalid, place, text);
         }
-        // Decoded, it is no longer than written.
+        // Decoded data is no longer than the URI.
         if let Err(over) = self.budget.take(uri.len() as u64, 1) {
             return self.too_large(place, over);
         }
@@ -245,7 +245,7 @@ fn check_length(i: usize, buffer: &buffer::Buffer, bytes: &[u8], report: &mut Re
     }
 }
 
-/// Whether a URI holds its data itself.
+/// Returns whether a URI contains its data.
 pub(super) fn is_data(uri: &str) -> bool {
     uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:"))
 }

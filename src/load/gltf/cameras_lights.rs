@@ -1,4 +1,4 @@
-//! What nodes place in the world besides meshes: cameras and lights.
+//! Cameras and lights that nodes place in the world.
 
 use super::codes::Code;
 use super::report::Report;
@@ -8,7 +8,7 @@ use gltf::json::extensions::scene::khr_lights_punctual as punctual;
 use gltf::json::validation::Checked;
 use gltf::json::{Root, scene::Node};
 
-/// The camera of a node; `None` when it shows nothing.
+/// Camera of a node; `None`, with a warning where the schema check gave none, if the camera is unusable.
 pub(super) fn camera(root: &Root, node: &Node, world: DAffine3, report: &mut Report) -> Option<Camera> {
     let index = node.camera?.value();
     let source = root.cameras.get(index)?;
@@ -24,7 +24,7 @@ pub(super) fn camera(root: &Root, node: &Node, world: DAffine3, report: &mut Rep
             let usable = x_mag > 0.0 && y_mag > 0.0 && x_mag.is_finite() && y_mag.is_finite();
             usable.then_some(Projection::Orthographic { x_mag, y_mag })
         }
-        // The checks have told of it.
+        // Reported by the schema check.
         _ => return None,
     };
     let placed = projection.zip(Camera::rigid(world));
@@ -36,7 +36,7 @@ pub(super) fn camera(root: &Root, node: &Node, world: DAffine3, report: &mut Rep
     Some(Camera { name: name(&source.name, node), projection, world_from_camera })
 }
 
-/// The light of a node.
+/// Light of a node; `None` if there is none or it is unusable.
 pub(super) fn light(root: &Root, node: &Node, world: DAffine3, report: &mut Report) -> Option<Light> {
     let index = node.extensions.as_ref()?.khr_lights_punctual.as_ref()?.light.value();
     let source = root.extensions.as_ref()?.khr_lights_punctual.as_ref()?.lights.get(index)?;
@@ -58,16 +58,16 @@ pub(super) fn light(root: &Root, node: &Node, world: DAffine3, report: &mut Repo
             let (inner, outer) = spot.as_ref().map_or((0.0, WIDE), cone);
             LightKind::Spot { position, direction, inner, outer, falloff }
         }
-        // The schema check has told of it.
+        // Reported by the schema check.
         _ => return None,
     };
     Some(Light { name: name(&source.name, node), intensity: color * intensity, kind, shadows: true, size: 0.0 })
 }
 
-/// The outer angle of a cone that none is given for.
+/// Default outer angle of a spot light's cone.
 const WIDE: f64 = std::f64::consts::FRAC_PI_4;
 
-/// The angles of a cone, 0 ≤ inner ≤ outer ≤ π/2.
+/// Inner and outer angle of a cone, 0 ≤ inner ≤ outer ≤ π/2.
 fn cone(spot: &punctual::Spot) -> (f64, f64) {
     let angle = |value: f32, otherwise: f64| {
         let value = f64::from(value);
@@ -77,7 +77,7 @@ fn cone(spot: &punctual::Spot) -> (f64, f64) {
     (angle(spot.inner_cone_angle, 0.0).min(outer), outer)
 }
 
-/// The name of a thing, or else of the node that holds it.
+/// Name of an object, or else of the node that holds it.
 fn name(own: &Option<String>, node: &Node) -> String {
     own.as_ref().filter(|n| !n.is_empty()).or(node.name.as_ref()).cloned().unwrap_or_default()
 }

@@ -1,35 +1,34 @@
-//! What becomes of each fault: one row for every code of the Khronos glTF validator that concerns a picture.
+//! Verdict on each fault: one row for every code of the Khronos glTF validator that concerns rendering.
 //!
-//! The rule behind the rows: **refuse** when it is unknown what the file shows (it is not glTF 2.0, a part that must be
-//! there is missing, a number points outside); **warn** when a rule is broken but what is drawn is clear, or when a part
-//! can be left out; **accept** in silence what changes nothing. Faults in animations are at most warned about, because
-//! nodes that they do not move can be drawn at rest, and so are those in images, because a material can be drawn without a
-//! map, in cameras, because there is always another view, and in the bounds that accessors declare, because nothing is
-//! drawn from them ([`Code::verdict_at`]). Of materials, textures, samplers and lights, and of names, what breaks the schema
-//! is left out (`mend`).
+//! The rule behind the rows: **refuse** when it is unknown what the file shows (it is not glTF 2.0, a required part is missing,
+//! an index is out of range); **warn** when a rule is broken but the rendering is clear, or when a part can be left out;
+//! **accept** silently what changes nothing. At most warnings are faults in animations, as unanimated nodes can be drawn at
+//! rest; in images, as a material can be drawn without a map; in cameras, as there is always another view; and in declared
+//! bounds, which rendering does not use ([`Code::verdict_at`]). In materials, textures, samplers, lights and names, properties
+//! that break the schema are left out (`mend`).
 
 use crate::load::diagnostic::{CUT_OFF, DAMAGED};
 use std::sync::LazyLock;
 
-/// What becomes of a fault.
+/// Consequence of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The file is not drawn.
     Refuse,
-    /// The file is drawn; the user is told.
+    /// The file is drawn, with a warning.
     Warn,
-    /// The file is drawn; nothing is said.
+    /// The file is drawn without a warning.
     Accept,
 }
 
 /// One row of the table.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
-    /// The Khronos validator's name.
+    /// Name of the code in the Khronos validator.
     pub khronos: &'static str,
-    /// What we do.
+    /// Consequence of the fault.
     pub verdict: Verdict,
-    /// Why, in a phrase.
+    /// Reason, in a phrase.
     pub why: &'static str,
 }
 
@@ -222,7 +221,7 @@ codes! {
     VolumeNoTransmission "KHR_MATERIALS_VOLUME_NO_TRANSMISSION" Accept "no light gets in";
     VariantsNonUnique "KHR_MATERIALS_VARIANTS_NON_UNIQUE_VARIANT" Accept "the first mapping counts, and is told where the variant is asked for";
 
-    // Animation: nothing is looked at unless it is played; what cannot be used of it is told then.
+    // Animations: checked only when played; faults are reported then.
     AccessorAnimationInputNegative "ACCESSOR_ANIMATION_INPUT_NEGATIVE" Accept "it has begun before 0";
     AccessorAnimationInputNonIncreasing "ACCESSOR_ANIMATION_INPUT_NON_INCREASING" Accept "told when it is played";
     AccessorAnimationQuaternion "ACCESSOR_ANIMATION_SAMPLER_OUTPUT_NON_NORMALIZED_QUATERNION" Accept "the rotation is made unit";
@@ -240,23 +239,23 @@ codes! {
     AnimationPointerPath "KHR_ANIMATION_POINTER_ANIMATION_CHANNEL_TARGET_PATH" Accept "told when it is played";
 }
 
-/// `gltf-unresolved-reference` and so on, in the order of [`TABLE`].
+/// Our names, `gltf-unresolved-reference` and so on, in the order of [`TABLE`].
 static NAMES: LazyLock<Vec<String>> = LazyLock::new(|| {
     TABLE.iter().map(|row| format!("gltf-{}", row.khronos.to_lowercase().replace('_', "-"))).collect()
 });
 
 impl Code {
-    /// Its row.
+    /// Row of the code in the table.
     pub fn row(self) -> &'static Row {
         &TABLE[self as usize]
     }
 
-    /// Our name for it in messages.
+    /// Our name of the code in messages.
     pub fn name(self) -> &'static str {
         &NAMES[self as usize]
     }
 
-    /// What helps where it refuses a file.
+    /// Remedy where the code refuses a file.
     pub fn remedy(self) -> &'static str {
         match self {
             Self::GlbLengthTooSmall
@@ -276,7 +275,7 @@ impl Code {
         }
     }
 
-    /// What becomes of it at a place: parts that a picture can do without are never a reason to refuse.
+    /// Verdict at a place: faults in dispensable parts are never a reason to refuse.
     pub fn verdict_at(self, place: &str) -> Verdict {
         let spared = ["animations", "cameras", "images"].iter().any(|part| place.starts_with(part) && place != *part);
         match self.row().verdict {
@@ -286,13 +285,13 @@ impl Code {
     }
 }
 
-/// Whether a place is in a material, a texture, a sampler or a light, or a name: these can do without what is broken in them.
+/// Returns whether a place lies in a material, texture, sampler or light, or is a name: broken properties there can be left out.
 pub(super) fn can_be_left_out(place: &str) -> bool {
     let looks = ["materials[", "textures[", "samplers["].iter().any(|list| place.starts_with(list));
     looks || place.contains("extensions.KHR_lights_punctual") || place.ends_with(".name")
 }
 
-/// Whether a place is in the bounds that an accessor declares: `accessors[3].min[0]`.
+/// Returns whether a place lies in the declared bounds of an accessor: `accessors[3].min[0]`.
 fn is_bound(place: &str) -> bool {
     let property = place.strip_prefix("accessors[").and_then(|rest| rest.split_once("]."));
     property.is_some_and(|(_, rest)| matches!(rest.split('[').next(), Some("min" | "max")))
@@ -320,7 +319,7 @@ mod tests {
 
     #[test]
     fn what_is_refused_or_warned_about_is_looked_for() {
-        /// Found by parts that have names of their own for it, or as a case of another code.
+        /// Codes covered by modules that use names of their own, or as a case of another code.
         const ELSEWHERE: &[(Code, &str)] = &[
             (Code::GlbInvalidMagic, "`detect` says what the file is instead"),
             (Code::IoError, "file-missing, file-unreadable and others, from `paths`"),

@@ -14,13 +14,13 @@ const HEADER: usize = 12;
 pub(super) struct Container<'a> {
     /// JSON text, without a byte-order mark.
     pub(super) json: &'a [u8],
-    /// What the first buffer holds, if the file is a GLB that has it.
+    /// Contents of the first buffer, if the file is a GLB with a binary chunk.
     pub(super) bin: Option<&'a [u8]>,
-    /// Whether it is a GLB.
+    /// Whether the file is a GLB.
     pub(super) binary: bool,
 }
 
-/// Splits a file; `None` when that cannot be done, with the reason in `report`.
+/// Splits a file into its parts; `None` if that is impossible, with the reason in `report`.
 pub(super) fn split<'a>(bytes: &'a [u8], report: &mut Report) -> Option<Container<'a>> {
     let (json, bin, binary) = if bytes.starts_with(b"glTF") {
         let (json, bin) = split_glb(bytes, report)?;
@@ -33,7 +33,7 @@ pub(super) fn split<'a>(bytes: &'a [u8], report: &mut Report) -> Option<Containe
     Some(Container { json: skip_mark(json, report), bin, binary })
 }
 
-/// A file that is neither: an empty `.glb`, or anything with a wrong name.
+/// Reports a file that is neither JSON nor GLB: an empty `.glb`, or another format under this name; returns whether it is.
 fn report_foreign(bytes: &[u8], report: &mut Report) -> bool {
     if bytes.len() < 4 && b"glTF".starts_with(bytes) {
         report.add(Code::GlbUnexpectedEndOfHeader, "", format!("a file of {} bytes holds no scene", bytes.len()));
@@ -44,7 +44,7 @@ fn report_foreign(bytes: &[u8], report: &mut Report) -> bool {
         return true;
     }
     let text = without_mark(bytes).trim_ascii_start();
-    // A list or a word is JSON at least, and its reader says more.
+    // A list or a scalar is JSON at least; the parser reports more precisely.
     if !text.first().is_some_and(|first| b"{[\"-0123456789tfn".contains(first)) {
         let text = "it begins neither with `glTF` nor with `{`, so it is no glTF";
         report.refuse_with(Code::InvalidJson, "", text, "give it the extension of what it is, or export it again");
@@ -83,7 +83,7 @@ fn split_glb<'a>(bytes: &'a [u8], report: &mut Report) -> Option<(&'a [u8], Opti
     chunks(bytes.get(HEADER..).unwrap_or_default(), length - HEADER, report)
 }
 
-/// Walks the chunks behind the header that begin in the bytes that it declares; the last may end behind these.
+/// Walks the chunks that begin within the length declared in the header; the last may end beyond it.
 fn chunks<'a>(bytes: &'a [u8], declared: usize, report: &mut Report) -> Option<(&'a [u8], Option<&'a [u8]>)> {
     let (mut json, mut bin) = (None, None);
     let mut rest = bytes;
@@ -94,7 +94,7 @@ fn chunks<'a>(bytes: &'a [u8], declared: usize, report: &mut Report) -> Option<(
         }
         let place = format!("chunk {number}");
         let (Some(length), Some(kind)) = (word(rest, 0), word(rest, 4)) else {
-            // Zeros behind the last chunk are padding of the file, not the start of another.
+            // Zeros after the last chunk are padding of the file, not another chunk.
             if number > 0 && rest.iter().all(|&b| b == 0 || b == b' ') {
                 break;
             }
@@ -119,7 +119,7 @@ fn chunks<'a>(bytes: &'a [u8], declared: usize, report: &mut Report) -> Option<(
                 let text = format!("it should have {length} bytes, the header leaves room for {room}");
                 (Code::GlbChunkTooBig, text)
             };
-            // Whether what is missing is needed shows when it is read.
+            // Missing binary data is reported where it is needed.
             if number == 0 {
                 report.add(code, place, text);
                 return None;
@@ -142,7 +142,7 @@ fn chunks<'a>(bytes: &'a [u8], declared: usize, report: &mut Report) -> Option<(
     json.map(|json| (json, bin))
 }
 
-/// The type of a chunk as the letters that it is made of, or as a number.
+/// Type of a chunk as its four characters, or as a number if they are not printable.
 fn name_of(kind: u32) -> String {
     let bytes = kind.to_le_bytes();
     match std::str::from_utf8(&bytes).map(|text| text.trim_end_matches(['\0', ' '])) {
@@ -186,7 +186,7 @@ mod tests {
 
     type Parts = (String, Option<Vec<u8>>);
 
-    /// The JSON and binary parts, and the names of all messages.
+    /// Splits a file; returns the JSON and binary parts, and the codes of all diagnostics.
     fn split_all(bytes: &[u8]) -> (Option<Parts>, Vec<&'static str>) {
         let mut report = Report::new(Path::new("a.glb"));
         let parts = split(bytes, &mut report)
@@ -210,7 +210,7 @@ mod tests {
         let whole = glb(&[(b"JSON", b"{}  "), (b"BIN\0", b"1234")]);
         for length in 0..whole.len() {
             let (parts, names) = split_all(&whole[..length]);
-            // Cut between the two chunks, or in the data of the second, the JSON is still whole.
+            // Cut between the chunks, or in the data of the second, the JSON is still whole.
             assert_eq!(parts.is_some(), length == 24 || length >= 32, "{length}");
             assert!(!names.is_empty(), "{length}");
         }

@@ -1,7 +1,7 @@
-//! JSON text -> the typed document of the `gltf` crate, after the schema check.
+//! JSON text -> typed document of the `gltf` crate, after the schema check.
 //!
-//! The crate's own validation is not used: it refuses legal files and panics on some broken ones. Its structs are
-//! plain data; everything that could panic on access (`Checked::unwrap`, indexing) is avoided throughout this loader.
+//! The crate's own validation is not used: it refuses legal files and panics on some broken ones. Its structs are plain data;
+//! this loader avoids every access that could panic (`Checked::unwrap`, indexing).
 
 use super::animation::{self, Animation, Originals};
 use super::codes::Code;
@@ -16,18 +16,18 @@ use serde::Deserialize;
 use serde_json::Number;
 use std::borrow::Cow;
 
-/// A document whose types and indices are right.
+/// A document whose types and indices are valid.
 pub(super) struct Document {
     pub(super) root: Root,
-    /// What it was charged with.
+    /// Bytes charged to the memory budget for the document.
     pub(super) bytes: u64,
     pub(super) animations: Vec<Animation>,
-    /// What pointers of animations change.
+    /// Entries that animation pointers change, as JSON.
     pub(super) originals: Originals,
     pub(super) morphs: Morphs,
 }
 
-/// Refuses JSON that is nested deeper than the parser goes.
+/// Refuses JSON that is nested deeper than the parser supports.
 pub(super) fn check_depth(weight: &Weight, report: &mut Report) {
     if weight.depth > DEEPEST {
         let text = format!("the JSON cannot be read: it is nested {} deep where {DEEPEST} are allowed", weight.depth);
@@ -35,7 +35,7 @@ pub(super) fn check_depth(weight: &Weight, report: &mut Report) {
     }
 }
 
-/// The text of JSON. Some exporters write names as their system codes them: what is not UTF-8 is replaced.
+/// Decodes JSON text. Some exporters write names in the encoding of their system: invalid UTF-8 is replaced.
 pub(super) fn text<'a>(json: &'a [u8], report: &mut Report) -> Cow<'a, str> {
     if let Err(e) = std::str::from_utf8(json) {
         let text = format!("the JSON is not UTF-8 at byte {}", e.valid_up_to());
@@ -59,8 +59,8 @@ pub(super) fn parse<'a>(text: &'a str, report: &mut Report) -> Option<Value<'a>>
     }
 }
 
-/// Turns checked JSON into the typed document, which was charged with so many bytes; images and cameras that broke the
-/// schema become empty ones.
+/// Converts checked JSON to the typed document, for which `bytes` were charged; images and cameras that broke the schema become
+/// empty ones.
 pub(super) fn typed(mut value: Value, bytes: u64, report: &mut Report) -> Option<Document> {
     let animations = animation::all(&value);
     simplify(&mut value);
@@ -91,19 +91,19 @@ pub(super) fn typed(mut value: Value, bytes: u64, report: &mut Report) -> Option
     }
 }
 
-/// An object that says its type.
+/// An object with only its type.
 fn blank(kind: &'static str) -> Value<'static> {
     Value::Object([("type", Value::String(kind.into()))].into_iter().collect())
 }
 
-/// Whether an image entry has the right types and refers to what is there.
+/// Returns whether an image entry has the right types and refers to an existing view.
 fn is_image(value: &Value, views: usize) -> bool {
     let text = |name| value.get(name).is_none_or(|text| text.as_str().is_some());
     let view = |v: &Value| schema::whole(v).is_some_and(|index| index < views as u64);
     value.is_object() && text("uri") && text("mimeType") && text("name") && value.get("bufferView").is_none_or(view)
 }
 
-/// Gives a camera the planes that it must have and that rays do not need, which is told elsewhere.
+/// Inserts missing clipping planes, which the typed camera requires and ray tracing ignores; they are reported elsewhere.
 fn planes(camera: &mut Map) {
     let mut need = |lens: &str, planes: &[(&'static str, f32)]| {
         if let Some(lens) = camera.get_mut(lens).and_then(Value::as_object_mut) {
@@ -116,14 +116,14 @@ fn planes(camera: &mut Map) {
     need("orthographic", &[("znear", 0.0), ("zfar", f32::MAX)]);
 }
 
-/// Does something to each object in a list.
+/// Applies `change` to each object in a list.
 fn each<'a>(map: &mut Map<'a>, list: &str, change: impl FnMut(&mut Map<'a>)) {
     let elements = map.get_mut(list).and_then(Value::as_array_mut).into_iter().flatten();
     elements.filter_map(Value::as_object_mut).for_each(change);
 }
 
-/// Takes out `extras`, which the typed structs cannot hold inside extensions, and writes whole numbers as such, where a
-/// file may say `1.0`.
+/// Removes `extras`, which the typed structs cannot hold inside extensions, and turns integral floats such as `1.0` into
+/// integers.
 fn simplify(value: &mut Value) {
     match value {
         Value::Object(map) => {
@@ -140,7 +140,7 @@ fn simplify(value: &mut Value) {
     }
 }
 
-/// Keeps the attributes whose names mean something; `TEXCOORD_01` would be taken for `TEXCOORD_1`.
+/// Removes attributes with unknown names; `TEXCOORD_01` would be read as `TEXCOORD_1`.
 fn known_attributes(primitive: &mut Map) {
     let clean = |attributes: &mut Map| attributes.retain(|name, _| is_semantic(name));
     primitive.get_mut("attributes").and_then(Value::as_object_mut).into_iter().for_each(clean);
@@ -148,7 +148,7 @@ fn known_attributes(primitive: &mut Map) {
     targets.filter_map(Value::as_object_mut).for_each(clean);
 }
 
-/// Whether this is the name of an attribute that glTF defines.
+/// Returns whether glTF defines an attribute of this name.
 pub(super) fn is_semantic(name: &str) -> bool {
     let set = |rest: &str| rest == "0" || (!rest.starts_with('0') && rest.parse::<u16>().is_ok());
     let sets = ["TEXCOORD_", "COLOR_", "JOINTS_", "WEIGHTS_"];

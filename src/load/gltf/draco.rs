@@ -1,8 +1,8 @@
-//! Primitives that are compressed as a whole: KHR_draco_mesh_compression.
+//! Compressed primitives: KHR_draco_mesh_compression.
 //!
-//! The extension names a stream, and for each attribute in it an accessor that says how many values of what type the
-//! attribute has. Decoded values are kept by accessor, so that whatever reads the accessor sees them; attributes that
-//! the extension does not list, and morph targets, are ordinary accessors. The order of vertices is that of the stream.
+//! The extension names a stream, and for each attribute in it an accessor that declares the count and type of its values.
+//! Decoded values are stored by accessor, so that every reader of the accessor gets them; attributes that the extension does not
+//! list, and morph targets, are ordinary accessors. The order of vertices is that of the stream.
 
 use super::accessor::Format;
 use super::buffers::Buffers;
@@ -23,13 +23,13 @@ use std::path::Path;
 
 const NAME: &str = "KHR_draco_mesh_compression";
 
-/// What to do about a file that cannot be read as it is.
+/// Remedy for a stream that cannot be decoded.
 const REMEDY: &str = "get the file again, or export it without Draco compression";
 
-/// What accessors show of streams.
+/// Contents of the accessors that streams define.
 #[derive(Default)]
 pub(super) struct Decoded {
-    /// Values of vertices, packed, in the type that each accessor declares, and how many there are.
+    /// Packed vertex values, in the type that each accessor declares, and their count.
     values: HashMap<usize, (Vec<u8>, u64)>,
     indices: HashMap<usize, Vec<u32>>,
 }
@@ -37,7 +37,7 @@ pub(super) struct Decoded {
 impl Decoded {
     /// Decodes every compressed primitive, in parallel, within `budget`.
     ///
-    /// One that cannot be decoded refuses the file, unless the file has the same data uncompressed.
+    /// A primitive that cannot be decoded refuses the file, unless the file contains the same data uncompressed.
     pub(super) fn load(root: &Root, buffers: &Buffers, file: &Path, budget: &mut Budget, report: &mut Report) -> Self {
         let mut plans = Vec::new();
         let mut owners = HashMap::new();
@@ -66,23 +66,23 @@ impl Decoded {
         decoded
     }
 
-    /// The values of vertices that an accessor shows, if they were decoded.
+    /// Decoded vertex values of an accessor, if there are any.
     pub(super) fn values(&self, accessor: usize) -> Option<&[u8]> {
         self.values.get(&accessor).map(|(bytes, _)| bytes.as_slice())
     }
 
-    /// The corners of triangles that an accessor shows, if they were decoded.
+    /// Decoded triangle corners of an accessor, if there are any.
     pub(super) fn indices(&self, accessor: usize) -> Option<&[u32]> {
         self.indices.get(&accessor).map(Vec::as_slice)
     }
 
-    /// How many elements an accessor shows, if they were decoded.
+    /// Number of decoded elements of an accessor, if there are any.
     pub(super) fn count(&self, accessor: usize) -> Option<u64> {
         let values = self.values.get(&accessor).map(|&(_, count)| count);
         values.or_else(|| self.indices(accessor).map(|corners| corners.len() as u64))
     }
 
-    /// Bytes that were decoded.
+    /// Total of decoded bytes.
     pub(super) fn len(&self) -> u64 {
         let values: u64 = self.values.values().map(|(bytes, _)| bytes.len() as u64).sum();
         values + self.indices.values().map(|corners| 4 * corners.len() as u64).sum::<u64>()
@@ -95,7 +95,7 @@ impl Decoded {
     }
 }
 
-/// The extension of a primitive, if it has one.
+/// Returns the extension of a primitive, if it has one.
 fn extension(primitive: &Primitive) -> Option<&Map<String, Value>> {
     primitive.extensions.as_ref()?.others.get(NAME)?.as_object()
 }
@@ -111,24 +111,24 @@ struct Task<'a> {
     place: String,
 }
 
-/// A stream whose sizes have been found to fit.
+/// A stream that passed the checks before decoding.
 struct Plan<'a> {
     task: Task<'a>,
     bytes: &'a [u8],
-    /// The accessor of the indices, and how many it declares.
+    /// Accessor of the indices, and its declared count.
     indices: (usize, u64),
-    /// The accessors of the attributes, what is wanted of each, and how many values it declares.
+    /// Accessors of the attributes, the requests to the decoder, and the declared counts.
     accessors: Vec<usize>,
     wanted: Vec<Wanted>,
     declared: Vec<u64>,
 }
 
-/// What an accessor shows: the number of a compressed view, and in its stream an attribute, or the indices (`None`).
+/// Contents of an accessor: index of the compressed view, and id of an attribute in its stream, or `None` for the indices.
 type Part = (usize, Option<u64>);
 
 impl<'a> Task<'a> {
-    /// Checks everything that can be known before decoding, and takes the memory; `None`: an earlier primitive shows
-    /// the same.
+    /// Checks everything that can be checked before decoding, and charges the memory; `None`: an earlier primitive defines the
+    /// same accessors.
     fn plan(&self, owners: &mut HashMap<usize, Part>, budget: &mut Budget) -> Result<Option<Plan<'a>>, Diagnostic> {
         let (view, bytes) = self.stream()?;
         let indices = self.indices()?;
@@ -147,7 +147,7 @@ impl<'a> Task<'a> {
         Ok(Some(Plan { task, bytes, indices, accessors, wanted, declared }))
     }
 
-    /// Notes what each accessor shows; `false`: all of it was noted before.
+    /// Registers the contents of accessors; returns whether any was new.
     fn claim(&self, shown: Vec<(usize, Part)>, owners: &mut HashMap<usize, Part>) -> Result<bool, Diagnostic> {
         let mut new = false;
         for (accessor, part) in shown {
@@ -170,7 +170,7 @@ impl<'a> Task<'a> {
         })
     }
 
-    /// The number of the compressed view, and its bytes.
+    /// Index of the compressed view, and its bytes.
     fn stream(&self) -> Result<(usize, &'a [u8]), Diagnostic> {
         let number = self.properties.get("bufferView").and_then(whole).and_then(|i| u32::try_from(i).ok());
         let view = number.ok_or_else(|| self.fault(".bufferView", "nothing says which bytes are compressed"))?;
@@ -181,7 +181,7 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// The accessor of the indices and how many it declares.
+    /// Accessor of the indices, and its declared count.
     fn indices(&self) -> Result<(usize, u64), Diagnostic> {
         let Checked::Valid(Mode::Triangles) = self.primitive.mode else {
             return Err(self.fault("", "only triangles can be decoded, and the primitive has another mode"));
@@ -194,7 +194,7 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// The accessors of the attributes that are compressed, and what is wanted for each.
+    /// Accessors of the compressed attributes, and the request for each.
     fn attributes(&self) -> (Vec<usize>, Vec<Wanted>) {
         let listed = self.properties.get("attributes").and_then(Value::as_object);
         let attribute = |(semantic, index): (&Checked<Semantic>, &Index<Accessor>)| {
@@ -209,7 +209,7 @@ impl<'a> Task<'a> {
         self.primitive.attributes.iter().filter_map(attribute).unzip()
     }
 
-    /// Tells of a primitive that cannot be decoded.
+    /// Reports a primitive that cannot be decoded.
     fn failed(&self, why: Diagnostic, report: &mut Report) {
         let required = self.root.extensions_required.iter().any(|name| name == NAME);
         let plain = |index: &Index<_>| self.root.accessors.get(index.value()).is_some_and(|a| a.buffer_view.is_some());
@@ -231,7 +231,7 @@ impl Plan<'_> {
         draco_codec::decode(self.bytes, &self.wanted)
     }
 
-    /// Tells where the accessors declare other numbers than the stream has.
+    /// Warns where the declared counts differ from those of the stream.
     fn compare(&self, output: &Output, report: &mut Report) {
         let (corners, vertices) = (output.indices.len() as u64, output.vertices);
         let other = self.declared.iter().find(|&&declared| declared != vertices);

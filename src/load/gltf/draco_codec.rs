@@ -1,52 +1,52 @@
-//! Draco streams -> indices and values of vertices, in the types that accessors declare.
+//! Draco streams -> indices and vertex values, in the types that accessors declare.
 
 use gltf::json::accessor::ComponentType;
 
-/// Attributes that a stream may have besides those that are wanted.
+/// Attributes that a stream may have in addition to the requested ones.
 pub(super) const SPARE: usize = 2;
 
-/// An attribute that is wanted, in the type that its accessor declares.
+/// A requested attribute, in the type that its accessor declares.
 #[derive(Clone, Debug)]
 #[cfg_attr(not(feature = "draco"), expect(dead_code, reason = "only the decoder looks for attributes"))]
 pub(super) struct Wanted {
-    /// Its number in the stream.
+    /// Id of the attribute in the stream.
     pub(super) id: u64,
-    /// Its name in messages.
+    /// Name of the attribute, for messages.
     pub(super) name: String,
     pub(super) component: ComponentType,
-    /// Components of a value.
+    /// Components per value.
     pub(super) width: usize,
-    /// Values at most.
+    /// Largest count of values that is accepted.
     pub(super) most: u64,
 }
 
 impl Wanted {
-    /// Bytes of all values at most.
+    /// Upper bound of the bytes of all values.
     pub(super) fn size(&self) -> u64 {
         self.most.saturating_mul((self.width * self.component.size()) as u64)
     }
 }
 
-/// What a stream decoded to.
+/// A decoded stream.
 pub(super) struct Output {
-    /// Corners of triangles.
+    /// Triangle corners.
     pub(super) indices: Vec<u32>,
-    /// Values of each attribute.
+    /// Number of vertices, and so of values of each attribute.
     pub(super) vertices: u64,
-    /// For each attribute that was wanted, the values of all vertices, packed.
+    /// Packed values of all vertices, for each requested attribute.
     pub(super) attributes: Vec<Vec<u8>>,
 }
 
-/// Decodes a stream that has no more values than are wanted at most.
+/// Decodes a stream with at most the requested number of values.
 ///
 /// # Errors
-/// What is wrong with the stream, or what it does not have.
+/// What is wrong with the stream, or which attribute it lacks.
 #[cfg(feature = "draco")]
 pub(super) fn decode(stream: &[u8], wanted: &[Wanted]) -> Result<Output, String> {
     decoder::decode(stream, wanted)
 }
 
-/// Without the library, says so.
+/// Stub without the library, which returns an error.
 #[cfg(not(feature = "draco"))]
 pub(super) fn decode(_: &[u8], _: &[Wanted]) -> Result<Output, String> {
     Err("this meshray was built without the feature 'draco'".into())
@@ -54,7 +54,7 @@ pub(super) fn decode(_: &[u8], _: &[Wanted]) -> Result<Output, String> {
 
 #[cfg(feature = "draco")]
 mod decoder {
-    //! What the library decodes, in the types that accessors declare.
+    //! Conversion of decoded values to the types that accessors declare.
 
     use super::{ComponentType, Output, Wanted};
     use crate::catch_panic::attempt;
@@ -96,7 +96,7 @@ mod decoder {
         Ok(Output { indices: corners.into_iter().map(number).collect(), vertices: vertices as u64, attributes })
     }
 
-    /// The mesh as the library has it, the point of each corner, and how the format numbers points if not like it.
+    /// Returns the decoded mesh, the point of each corner, and the format's order of points where it differs from the library's.
     fn mesh(stream: &[u8], wanted: &[Wanted]) -> Result<(Mesh, Vec<u32>, Option<Points>), String> {
         let survey = check(stream, wanted)?;
         let mesh = draco_oxide_decoder::decode_mesh(stream);
@@ -116,7 +116,7 @@ mod decoder {
         Ok((mesh, corners, Some(points)))
     }
 
-    /// For each point, where its value is.
+    /// Index of the value of each point.
     fn places(attribute: &Attribute) -> Vec<u32> {
         match attribute.point_map_as_slice() {
             Some(map) => map.iter().map(|&place| usize::from(place) as u32).collect(),
@@ -128,10 +128,10 @@ mod decoder {
         "a vertex without a value: the stream is damaged".into()
     }
 
-    /// Decoded values, each once.
+    /// Decoded values, without duplicates.
     struct Values<'a> {
         bytes: &'a [u8],
-        /// Draco's number of the component type.
+        /// Draco's code of the component type.
         kind: u8,
         width: usize,
     }
@@ -143,7 +143,7 @@ mod decoder {
     }
 
     impl Values<'_> {
-        /// The value of every vertex, which are found at `places`, in the type that is wanted, and how many there are.
+        /// Converts the values at `places`, one per vertex, to the requested type; also returns their count.
         fn convert(&self, places: &[u32], w: &Wanted) -> Result<(Vec<u8>, usize), String> {
             let count = places.len();
             if self.width != w.width {
@@ -153,7 +153,7 @@ mod decoder {
                 return Err(format!("{count} values in the stream, where {} are possible", w.most));
             }
             let size = self.size()?;
-            // The library keeps values as the machine does, files keep the lowest byte first.
+            // The library stores values in native byte order, glTF in little-endian order.
             let same = self.kind == kind_of(w.component) && cfg!(target_endian = "little");
             let mut out = Vec::with_capacity(count * w.width * w.component.size());
             for &place in places {
@@ -171,7 +171,7 @@ mod decoder {
             Ok((out, count))
         }
 
-        /// Bytes of a component.
+        /// Bytes per component.
         fn size(&self) -> Result<usize, String> {
             match self.kind {
                 1 | 2 => Ok(1),
@@ -181,7 +181,7 @@ mod decoder {
             }
         }
 
-        /// A component of the stream, in the byte order of the machine.
+        /// Reads a component, which is in native byte order.
         fn number(&self, bytes: &[u8]) -> Number {
             let (one, two, four) = (bytes.first_chunk(), bytes.first_chunk(), bytes.first_chunk());
             match (self.kind, one, two, four) {
@@ -192,13 +192,13 @@ mod decoder {
                 (5, _, _, Some(&b)) => Number::Whole(i32::from_ne_bytes(b).into()),
                 (6, _, _, Some(&b)) => Number::Whole(u32::from_ne_bytes(b).into()),
                 (_, _, _, Some(&b)) => Number::Float(f32::from_ne_bytes(b)),
-                // `size` has left no other.
+                // Unreachable: `size` rejects all other types.
                 _ => Number::Whole(0),
             }
         }
     }
 
-    /// Draco's number of a component type.
+    /// Draco's code of a component type.
     fn kind_of(component: ComponentType) -> u8 {
         match component {
             ComponentType::I8 => 1,
@@ -210,7 +210,7 @@ mod decoder {
         }
     }
 
-    /// Writes a number as a component of an accessor.
+    /// Appends a number as a component of an accessor.
     fn write(number: Number, component: ComponentType, out: &mut Vec<u8>) -> Result<(), String> {
         let whole = match number {
             Number::Whole(whole) => whole,

@@ -1,26 +1,26 @@
-//! The order of the points of a mesh that was encoded as a walk over its triangles.
+//! Order of the points of a mesh that was encoded by an edgebreaker traversal.
 //!
-//! The library numbers points as it meets them. The format says another order (`AssignPointsToCorners` of the Draco
+//! The library numbers points as it meets them. The format prescribes another order (`AssignPointsToCorners` of the Draco
 //! bitstream specification, version 2.2): vertex by vertex, around each from its left-most corner or from a seam on.
-//! Attributes and morph targets that are not compressed are stored in that order.
+//! Uncompressed attributes and morph targets are stored in that order.
 
 use draco_oxide_core::mesh::ds::GenericCornerTable as _;
 use draco_oxide_core::types::CornerIdx;
 use draco_oxide_decoder::connectivity::EdgebreakerConnectivity;
 
-/// The library's mark for no corner.
+/// Marks "no corner" in the library.
 pub(super) const NONE: usize = u32::MAX as usize;
 
-/// The points that some triangle shows.
+/// Points that some triangle uses.
 pub(super) struct Points {
-    /// In the order of the format.
+    /// Points of the library, in the order of the format.
     pub(super) shown: Vec<u32>,
-    /// For each point of the library, its place among these.
+    /// Position in `shown` of each point of the library.
     pub(super) number: Vec<u32>,
 }
 
 impl Points {
-    /// Numbers the points of `corners`; `values` tells for each attribute the place of a point's value.
+    /// Numbers the points of `corners`; `values` maps, for each attribute, points to indices of values.
     ///
     /// `None`: the stream is damaged.
     pub(super) fn of(
@@ -36,7 +36,7 @@ impl Points {
         let last = corners.iter().max().map_or(0, |&last| last as usize);
         let number = vec![u32::MAX; Some(last + 1).filter(|&count| count <= corners.len().max(1))?];
         let mut points = Self { shown: Vec::new(), number };
-        // Once around each vertex, and once for each of its seams.
+        // One round about each vertex, and one for each of its seams.
         let steps = corners.len().saturating_mul(seams.len() + 1);
         let mut around = Around { walked, corners, seams, left: steps };
         for (vertex, &corner) in walked.vertex_corners.iter().enumerate().filter(|(_, c)| usize::from(**c) != NONE) {
@@ -44,7 +44,7 @@ impl Points {
             let (mut at, mut before) = (Some(first), None);
             while let Some(corner) = at {
                 let point = around.point(corner)?;
-                // Where a seam ends at a vertex nothing changes there, and the library makes two points of one.
+                // Where a seam ends at a vertex the values do not change, but the library makes two points of it.
                 let same = match before {
                     Some(before) => around.is_same(before, point)?.then_some(before),
                     None => None,
@@ -57,7 +57,7 @@ impl Points {
         corners.iter().all(met).then_some(points)
     }
 
-    /// Numbers a point, if it has none, as one before it that is the `same`, or as the next.
+    /// Numbers an unnumbered point, either like an earlier point with the `same` values or with the next number.
     fn add(&mut self, point: u32, same: Option<u32>) -> Option<()> {
         let known = same.and_then(|same| self.number.get(same as usize)).copied();
         let number = self.number.get_mut(point as usize)?;
@@ -72,18 +72,18 @@ impl Points {
     }
 }
 
-/// Steps around vertices.
+/// Traversal of the corners around vertices.
 struct Around<'a> {
     walked: &'a EdgebreakerConnectivity,
     corners: &'a [u32],
-    /// Seams by their number, with the place of each point's value.
+    /// Seams by id, each with the value index of every point.
     seams: Vec<(u8, &'a [u32])>,
-    /// Steps that a mesh without damage does not need.
+    /// Remaining steps; an undamaged mesh never exceeds them.
     left: usize,
 }
 
 impl Around<'_> {
-    /// The corner that a round begins with.
+    /// Corner at which the round about a vertex starts.
     fn first(&mut self, vertex: usize, corner: CornerIdx) -> Option<CornerIdx> {
         if self.walked.is_vert_hole.get(vertex).copied().unwrap_or(true) {
             return Some(corner);
@@ -101,7 +101,7 @@ impl Around<'_> {
         Some(corner)
     }
 
-    /// The next corner around the same vertex; the outer `None`: there is no end to them.
+    /// Next corner around the same vertex; the outer `None`: the steps are used up, so the round has no end.
     fn next(&mut self, corner: CornerIdx) -> Option<Option<CornerIdx>> {
         self.left = self.left.checked_sub(1)?;
         Some(self.walked.corner_table.swing_right(corner))
@@ -115,7 +115,7 @@ impl Around<'_> {
         self.seams.get(seam)?.1.get(self.point(corner)? as usize).copied()
     }
 
-    /// Whether two points of a vertex have the same values.
+    /// Returns whether two points of a vertex have equal values.
     fn is_same(&self, one: u32, other: u32) -> Option<bool> {
         let mut same = true;
         for (_, values) in &self.seams {

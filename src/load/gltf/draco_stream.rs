@@ -1,35 +1,35 @@
-//! The start of a Draco stream: what it holds and how much of it.
+//! The start of a Draco stream: its encoding method and its counts.
 //!
-//! After the Draco bitstream specification, version 2.2. Decoders take memory by these numbers, so that they are looked
-//! at before.
+//! After the Draco bitstream specification, version 2.2. Decoders allocate memory by these counts, so they are checked before.
 
-/// What a stream says of its size.
+/// Counts that a stream declares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Counts {
     /// Triangles.
     pub(super) faces: u64,
-    /// Vertices; where a seam runs through one, it becomes several.
+    /// Vertices; a vertex that a seam crosses becomes several.
     pub(super) vertices: u64,
-    /// Whether `vertices` are all there will be.
+    /// Whether seams cannot add to `vertices`.
     final_vertices: bool,
 }
 
 impl Counts {
-    /// Values of an attribute at most, where accessors declare so many: several encoders declare a few too many or too few.
+    /// Upper bound of the values of an attribute whose accessor declares `declared`: several encoders declare slightly too many
+    /// or too few.
     pub(super) fn most_values(&self, declared: u64) -> u64 {
         if self.final_vertices {
             return self.vertices;
         }
         let known = self.vertices.max(declared);
         let most = known.saturating_add(known / 4 + 64);
-        // No more than one for each corner.
+        // At most one for each corner.
         most.min(self.faces.saturating_mul(3)).max(self.vertices)
     }
 
-    /// Bytes that decoding into so many vertices with so many attributes takes for a while.
+    /// Temporary memory, in bytes, for decoding so many vertices and attributes.
     ///
-    /// Of a triangle: the opposite and the vertex of each corner, its seams, symbol and point; of a value: its
-    /// correction, itself whole and as floats, and where it is.
+    /// Per triangle: the opposite and the vertex of each corner, its seams, symbol and point; per value: its correction, its
+    /// integer and float form, and its index.
     pub(super) fn cost(&self, vertices: u64, attributes: u64) -> u64 {
         const TRIANGLE: u64 = 128;
         const VALUE: u64 = 64;
@@ -38,7 +38,7 @@ impl Counts {
     }
 }
 
-/// A place in a stream.
+/// Read position in a stream.
 pub(super) struct Cursor<'a>(pub(super) &'a [u8]);
 
 impl<'a> Cursor<'a> {
@@ -52,7 +52,7 @@ impl<'a> Cursor<'a> {
         Ok(self.take(1)?[0])
     }
 
-    /// A number in groups of seven bits, the lowest first.
+    /// Reads a variable-length integer: groups of seven bits, the lowest first.
     pub(super) fn number(&mut self) -> Result<u64, String> {
         let mut number = 0;
         for shift in (0..35).step_by(7) {
@@ -65,7 +65,7 @@ impl<'a> Cursor<'a> {
         Err("a number in the stream is too large: it is damaged".into())
     }
 
-    /// Reads past the header and the metadata; gives the number of the method.
+    /// Skips the header and the metadata; returns the code of the encoding method.
     pub(super) fn header(&mut self) -> Result<u8, String> {
         if self.take(5)? != b"DRACO" {
             return Err("its bytes are no Draco stream".into());
@@ -85,7 +85,7 @@ impl<'a> Cursor<'a> {
         Ok(method)
     }
 
-    /// Metadata of the mesh and its attributes, which no picture shows.
+    /// Skips the metadata of the mesh and its attributes, which rendering does not use.
     fn metadata(&mut self) -> Result<(), String> {
         for _ in 0..self.number()? {
             self.number()?;
@@ -95,7 +95,7 @@ impl<'a> Cursor<'a> {
     }
 
     fn entries(&mut self, depth: u32) -> Result<(), String> {
-        /// Far deeper than any encoder goes.
+        /// Deepest nesting that is read; no encoder comes near it.
         const DEEPEST: u32 = 64;
         if depth > DEEPEST {
             return Err(format!("its metadata is nested more than {DEEPEST} deep"));
@@ -122,19 +122,19 @@ fn cut() -> String {
     "the stream ends too early".into()
 }
 
-/// How faces are encoded.
+/// Encoding of the faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Method {
-    /// Indices one after the other.
+    /// A list of indices.
     Sequential,
-    /// A walk from triangle to triangle; with its way of telling them.
+    /// An edgebreaker traversal, with the type of its symbol encoding and the number of its seam sets.
     Edgebreaker { traversal: u8, seams: u8 },
 }
 
-/// Reads what a stream says of its size; the cursor is left where the encoded faces begin.
+/// Reads the declared counts of a stream; the returned cursor stands at the encoded faces.
 ///
 /// # Errors
-/// Why it cannot be decoded.
+/// The reason why the stream cannot be decoded.
 pub(super) fn start(stream: &[u8]) -> Result<(Counts, Method, Cursor<'_>), String> {
     let mut cursor = Cursor(stream);
     let (counts, method) = match cursor.header()? {
@@ -145,7 +145,7 @@ pub(super) fn start(stream: &[u8]) -> Result<(Counts, Method, Cursor<'_>), Strin
         1 => edgebreaker(&mut cursor)?,
         method => return Err(format!("the stream is encoded by an unknown method, {method}")),
     };
-    // Corners are numbered with 32 bits.
+    // Corner indices have 32 bits.
     if counts.faces > u64::from(u32::MAX / 4) || counts.vertices > u64::from(u32::MAX) {
         let Counts { faces, vertices, .. } = counts;
         return Err(format!("{faces} triangles and {vertices} vertices are more than can be decoded"));

@@ -1,7 +1,7 @@
-//! A walk over a Draco stream that decodes no values and checks whatever the decoder takes memory by.
+//! A pass over a Draco stream that decodes no values but checks every count by which the decoder allocates memory.
 //!
-//! The decoder believes the numbers of attributes, symbols and orientations that a stream declares, and a damaged one
-//! may declare any. After the Draco bitstream specification, version 2.2.
+//! The decoder trusts the numbers of attributes, symbols and orientations that a stream declares, and a damaged stream may
+//! declare any. After the Draco bitstream specification, version 2.2.
 
 use super::draco_codec::{SPARE, Wanted};
 use super::draco_points::NONE;
@@ -11,24 +11,24 @@ use draco_oxide_core::codec::header::EncoderMethod;
 use draco_oxide_decoder::connectivity::{Connectivity, EdgebreakerConnectivity, decode_connectivity};
 use draco_oxide_decoder::entropy::start_symbol_decoder;
 
-/// Symbols that an alphabet has at most: the widest that are coded directly have 18 bits.
+/// Largest alphabet: the widest directly coded symbols have 18 bits.
 const ALPHABET: u64 = 1 << 18;
 
-/// Contexts of the traversal that sorts symbols by the valence of vertices.
+/// Contexts of the traversal that predicts symbols by the valence of vertices.
 const VALENCES: usize = 6;
 
-/// What decoding a stream does not tell.
+/// Properties of a stream that the decoder does not return.
 pub(super) struct Survey {
-    /// How triangles are connected, where the stream walks over them.
+    /// Connectivity of the triangles, for edgebreaker streams.
     pub(super) connectivity: Option<Connectivity>,
-    /// The number of the seams that divide each attribute.
+    /// Id of the seams that divide each attribute.
     pub(super) seams: Vec<Option<u8>>,
 }
 
-/// Checks a stream whose start agrees with what is wanted; panics as the decoder does.
+/// Checks a stream whose counts fit `wanted`; like the decoder, it may panic on damaged streams.
 ///
 /// # Errors
-/// What is wrong with it.
+/// What is wrong with the stream.
 pub(super) fn check(stream: &[u8], wanted: &[Wanted]) -> Result<Survey, String> {
     let (counts, method, cursor) = start(stream)?;
     let most = wanted.iter().map(|w| w.most).max().unwrap_or(0);
@@ -57,11 +57,11 @@ pub(super) fn check(stream: &[u8], wanted: &[Wanted]) -> Result<Survey, String> 
     Ok(Survey { connectivity, seams })
 }
 
-/// How many values attributes have.
+/// Number of values per attribute.
 enum Sizes {
-    /// One for every vertex.
+    /// One value per vertex.
     Same(u64),
-    /// One for every vertex, and more where a seam of the attribute divides it.
+    /// One value per vertex, and more where seams of the attribute divide it.
     Seams { vertices: u64, divided: Vec<u64> },
 }
 
@@ -91,26 +91,26 @@ impl Sizes {
     }
 }
 
-/// The part of a stream that begins with its faces, header and metadata left out.
+/// Part of a stream from its faces on, after header and metadata.
 fn faces_of(stream: &[u8]) -> Result<&[u8], String> {
     let mut cursor = Cursor(stream);
     cursor.header()?;
     Ok(cursor.0)
 }
 
-/// Vertices that have a corner.
+/// Number of vertices that have a corner.
 fn referenced(walked: &EdgebreakerConnectivity) -> u64 {
     let corners = walked.vertex_corners.iter().take(walked.num_vertices);
     corners.filter(|&&corner| usize::from(corner) != NONE).count() as u64
 }
 
-/// What a stream says of an attribute.
+/// Description of an attribute in a stream.
 struct Attribute {
-    /// The seams that divide it.
+    /// Id of the seams that divide the attribute.
     seams: Option<u8>,
     component: u8,
     width: u8,
-    /// What was done to its values: 0 nothing, 1 made whole numbers, 2 quantised, 3 made octahedral.
+    /// Encoding of its values: 0 generic, 1 integers, 2 quantised, 3 octahedral.
     form: u8,
 }
 
@@ -121,7 +121,7 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// Indices that stand one after the other.
+    /// Passes a list of indices.
     fn indices(&mut self, faces: u64, vertices: u64) -> Result<(), String> {
         if faces > self.cursor.0.len() as u64 / 3 {
             return Err(many("triangles", faces, self.cursor.0.len() as u64 / 3));
@@ -136,7 +136,7 @@ impl Walk<'_> {
         }
     }
 
-    /// The symbols of a walk over the triangles.
+    /// Passes the symbols of an edgebreaker traversal.
     fn traversal(&mut self, traversal: u8, seams: u8, faces: u64) -> Result<(), String> {
         if traversal == 0 {
             self.block()?;
@@ -156,7 +156,7 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// What the stream says of its attributes, those of one decoder together.
+    /// Reads the descriptions of the attributes, grouped by attribute decoder.
     fn descriptions(&mut self, walked: bool) -> Result<Vec<Vec<Attribute>>, String> {
         let mut decoders = Vec::new();
         for _ in 0..self.cursor.byte()? {
@@ -184,7 +184,7 @@ impl Walk<'_> {
         Ok(decoders.into_iter().map(|(_, attributes)| attributes).collect())
     }
 
-    /// The encoded values of an attribute.
+    /// Passes the encoded values of an attribute.
     fn values(&mut self, attribute: &Attribute, count: u64) -> Result<(), String> {
         if count > self.most {
             return Err(many("values of an attribute", count, self.most));
@@ -219,14 +219,14 @@ impl Walk<'_> {
             }
             _ => {}
         }
-        // Two numbers: the range of wrapped values, or the grid of octahedral ones.
+        // Two numbers: the range of wrapped values, or the quantisation of octahedral ones.
         if let Some(1 | 3) = transform {
             self.cursor.take(8)?;
         }
         if scheme == 6 { self.bits() } else { Ok(()) }
     }
 
-    /// What turns the values of an attribute into floats.
+    /// Passes the parameters that turn the values of an attribute into floats.
     fn transform(&mut self, attribute: &Attribute) -> Result<(), String> {
         let length = match attribute.form {
             2 => 4 * u64::from(attribute.width) + 5,
@@ -236,13 +236,13 @@ impl Walk<'_> {
         self.cursor.take(length).map(drop)
     }
 
-    /// Bytes behind their number.
+    /// Passes a block of bytes that its length precedes.
     fn block(&mut self) -> Result<(), String> {
         let length = self.cursor.number()?;
         self.cursor.take(length).map(drop)
     }
 
-    /// Coded bits, behind the probability of a zero.
+    /// Passes entropy-coded bits, which the probability of a zero precedes.
     fn bits(&mut self) -> Result<(), String> {
         self.cursor.byte()?;
         self.block()
@@ -252,7 +252,7 @@ impl Walk<'_> {
         if count > 0 { self.bits() } else { Ok(()) }
     }
 
-    /// Coded symbols, `width` of which make a value.
+    /// Passes entropy-coded symbols, `width` per value.
     fn symbols(&mut self, count: u64, width: u64) -> Result<(), String> {
         let whole = self.cursor.0;
         let direct = self.cursor.byte()? != 0;
@@ -262,7 +262,7 @@ impl Walk<'_> {
         self.alphabet()?;
         self.block()?;
         if !direct {
-            // How long the values are, which follow, is known when their lengths are decoded.
+            // The extent of the raw values that follow is known only once their bit lengths are decoded.
             let count = usize::try_from(count).map_err(|e| e.to_string())?;
             let mut reader = Reader::new(whole);
             start_symbol_decoder(&mut reader, count, width as usize).map_err(broken)?;
@@ -272,7 +272,7 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// How often each symbol is met.
+    /// Passes the frequencies of the symbols.
     fn alphabet(&mut self) -> Result<(), String> {
         let count = self.cursor.number()?;
         if count > ALPHABET {

@@ -1,4 +1,4 @@
-//! Which extensions are understood, and what is said about the others.
+//! Supported extensions, and messages about all others.
 
 use super::codes::Code;
 use super::report::Report;
@@ -8,7 +8,7 @@ use crate::load::{Diagnostic, ExtensionFacts};
 use std::collections::HashSet;
 use std::path::Path;
 
-/// Understood completely, as far as a still picture shows.
+/// Supported completely, as far as a still picture is concerned.
 const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -37,7 +37,7 @@ const SUPPORTED: &[&str] = &[
     "KHR_texture_transform",
 ];
 
-/// Not understood, and no picture shows it.
+/// Not supported, but without effect on a picture.
 const HARMLESS: &[&str] = &[
     "AGI_articulations",
     "AGI_stk_metadata",
@@ -93,7 +93,7 @@ const HARMLESS: &[&str] = &[
     "VRMC_vrm_animation",
 ];
 
-/// Whether what an extension needs is part of this build.
+/// Returns whether this build includes what an extension needs.
 fn is_built(name: &str) -> bool {
     match name {
         "KHR_draco_mesh_compression" => cfg!(feature = "draco"),
@@ -103,7 +103,7 @@ fn is_built(name: &str) -> bool {
     }
 }
 
-/// What to do about an extension that is required and not understood.
+/// Remedy for an extension that is required and not supported.
 fn remedy(name: &str) -> &'static str {
     match name {
         "KHR_draco_mesh_compression" => "build meshray with the feature 'draco', or export it without Draco",
@@ -119,17 +119,17 @@ fn remedy(name: &str) -> &'static str {
     }
 }
 
-/// Names in one message before the rest is only counted.
+/// Most names in one message; the rest is only counted.
 const LISTED: usize = 20;
 
-/// The extensions a file names.
+/// The extensions that a file declares.
 pub(super) struct Lists {
     used: Vec<String>,
     required: Vec<String>,
 }
 
 impl Lists {
-    /// Reads them from JSON that nothing has checked yet.
+    /// Reads the lists from unchecked JSON.
     pub(super) fn of(root: &Value) -> Self {
         let list = |name: &str| {
             let words = root.get(name).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str);
@@ -138,7 +138,7 @@ impl Lists {
         Self { used: list("extensionsUsed"), required: list("extensionsRequired") }
     }
 
-    /// Each extension once.
+    /// Returns the facts about each extension, without duplicates.
     pub(super) fn facts(&self) -> Vec<ExtensionFacts> {
         let required: HashSet<&String> = self.required.iter().collect();
         let mut seen = HashSet::new();
@@ -152,7 +152,7 @@ impl Lists {
         each_once.map(facts).collect()
     }
 
-    /// Refuses what is required and not understood; names in one warning what is only used and changes the look.
+    /// Refuses required extensions that are not supported; one warning names the optional ones that change the look.
     pub(super) fn check(&self, file: &Path, report: &mut Report) {
         let mut ignored = Vec::new();
         for ExtensionFacts { name, required, supported } in self.facts() {
@@ -193,7 +193,7 @@ impl Lists {
     }
 }
 
-/// Extensions with a stand-in in the file, which tell for themselves where the stand-in is missing.
+/// Returns whether an extension has a fallback in the file; the readers of these report a missing fallback themselves.
 fn has_stand_in(name: &str) -> bool {
     name == "MSFT_texture_dds" || !is_built(name)
 }

@@ -1,19 +1,19 @@
-//! Corners -> triangles, and meshes without what cannot be drawn.
+//! Corners -> triangles and lines, and removal of what cannot be drawn from meshes.
 
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::scene::Mesh;
 use bytemuck::allocation::try_cast_vec;
 use gltf::json::mesh::Mode;
 
-/// The triangles of a primitive as glTF 2.0 §3.7.2.1 orders their corners.
+/// Triangles of a primitive, with corners in the order of glTF 2.0 §3.7.2.1.
 ///
-/// `None` for points and lines. Corners left over make no face.
+/// `None` for points and lines. Left-over corners are dropped.
 pub(super) fn triangles(mode: Mode, mut corners: Vec<u32>) -> Option<Vec<[u32; 3]>> {
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     match mode {
         Mode::Triangles => {
             corners.truncate(corners.len() / 3 * 3);
-            // In the same memory, where there is just enough of it.
+            // Reuses the memory where the capacity is a multiple of three.
             return Some(try_cast_vec(corners).unwrap_or_else(|(_, corners)| corners.as_chunks().0.to_vec()));
         }
         Mode::TriangleStrip => {
@@ -29,9 +29,9 @@ pub(super) fn triangles(mode: Mode, mut corners: Vec<u32>) -> Option<Vec<[u32; 3
     Some(triangles)
 }
 
-/// The ends of the lines of a primitive in the order of glTF 2.0 §3.7.2.1; the same vertex twice for a point.
+/// Ends of the lines of a primitive, in the order of glTF 2.0 §3.7.2.1; a point has the same vertex twice.
 ///
-/// Nothing for triangles. A corner left over makes no line.
+/// Empty for triangles. A left-over corner is dropped.
 pub(super) fn lines(mode: Mode, corners: &[u32]) -> Vec<[u32; 2]> {
     let steps = corners.windows(2).map(|l| [l[0], l[1]]);
     match mode {
@@ -46,14 +46,15 @@ pub(super) fn lines(mode: Mode, corners: &[u32]) -> Vec<[u32; 2]> {
     }
 }
 
-/// Numbers corners among the vertices in use and gives those, ascending; `None`: all `vertices` are in use.
+/// Renumbers corners by the vertices in use and returns these, ascending; `None`: all `vertices` are in use.
 ///
-/// Takes time and memory for the corners, however large the pool of vertices is. Every corner is below `vertices`.
+/// Time and memory depend on the number of corners, however large the pool of vertices is. Every corner has to be below
+/// `vertices`.
 pub(super) fn gather(corners: &mut [u32], vertices: u64) -> Option<Vec<u32>> {
-    /// Up to so many vertices for each corner, a table of the vertices is quicker than sorting the corners.
+    /// Up to this many vertices per corner, a table of all vertices is faster than sorting the corners.
     const DENSE: u64 = 2;
     if vertices <= DENSE.saturating_mul(corners.len() as u64) {
-        // As large as a list in memory, so that it fits.
+        // Lossless, as `vertices` is bounded by the length of a list.
         let mut places = vec![u32::MAX; vertices as usize];
         corners.iter().for_each(|&corner| places[corner as usize] = 0);
         let used: Vec<u32> = (0..).zip(&places).filter(|(_, place)| **place == 0).map(|(vertex, _)| vertex).collect();
@@ -67,30 +68,30 @@ pub(super) fn gather(corners: &mut [u32], vertices: u64) -> Option<Vec<u32>> {
     let mut used = corners.to_vec();
     used.sort_unstable();
     used.dedup();
-    // Found, because the list was made of them.
+    // Always found, as the list was made from the corners.
     let place = |corner: u32| used.partition_point(|&vertex| vertex < corner) as u32;
     corners.iter_mut().for_each(|corner| *corner = place(*corner));
     Some(used)
 }
 
-/// Faces left out of a mesh.
+/// Numbers of faces left out of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Dropped {
-    /// With a corner that is not a finite place.
+    /// Faces with a corner whose position is not finite.
     pub(super) not_finite: u64,
-    /// With two corners in one place.
+    /// Faces with two corners in one position.
     pub(super) degenerate: u64,
 }
 
-/// Leaves out faces that cannot be drawn, and the vertices that no face needs any more.
+/// Removes faces that cannot be drawn, and vertices that are then unused.
 ///
-/// `joined` says that repeated indices join strips and are no fault.
+/// `joined`: repeated indices join strips and are no fault.
 pub(super) fn clean(mesh: &mut Mesh, joined: bool) -> Dropped {
     let mut dropped = Dropped::default();
     let places = |triangle: &[u32; 3]| triangle.map(|v| mesh.positions.get(v as usize).copied().unwrap_or(Vec3::NAN));
     let is_finite = |[a, b, c]: [Vec3; 3]| a.is_finite() && b.is_finite() && c.is_finite();
     let has_three = |[a, b, c]: [Vec3; 3]| a != b && b != c && c != a;
-    // Mostly all of them can be drawn.
+    // In most meshes all faces can be drawn.
     let are_finite = mesh.positions.iter().fold(true, |all, p| all & p.is_finite());
     let is_there = |triangle: &[u32; 3]| triangle.iter().all(|&v| (v as usize) < mesh.positions.len());
     if !are_finite || !mesh.triangles.iter().all(|triangle| is_there(triangle) && has_three(places(triangle))) {
@@ -113,7 +114,7 @@ pub(super) fn clean(mesh: &mut Mesh, joined: bool) -> Dropped {
     dropped
 }
 
-/// Takes out vertices that no triangle uses.
+/// Removes vertices that no triangle uses.
 fn compact(mesh: &mut Mesh) {
     let mut used = vec![false; mesh.positions.len()];
     mesh.triangles.as_flattened().iter().for_each(|&vertex| used[vertex as usize] = true);
@@ -136,21 +137,21 @@ fn compact(mesh: &mut Mesh) {
     mesh.uvs.iter_mut().for_each(|uvs| keep(uvs, &used));
 }
 
-/// What was odd about directions.
+/// Faults found in directions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Odd {
-    /// Some were not of unit length.
+    /// Some vectors were not of unit length.
     pub(super) length: bool,
-    /// Some had no direction at all.
+    /// Some vectors had no direction.
     pub(super) none: bool,
     /// Some signs were neither 1 nor −1.
     pub(super) sign: bool,
 }
 
-/// Normals and tangents in 8 bits, normalised, are off by less.
+/// Tolerance of unit length: 8-bit normalised normals and tangents deviate by less.
 const UNIT: f32 = 0.02;
 
-/// Makes normals unit; those without a direction become the mean of the faces around them.
+/// Normalises normals; those without a direction become the area-weighted mean of the adjacent face normals.
 pub(super) fn repair_normals(mesh: &mut Mesh) -> Odd {
     let mut odd = Odd::default();
     for normal in &mut mesh.normals {
@@ -174,7 +175,7 @@ pub(super) fn repair_normals(mesh: &mut Mesh) -> Odd {
     odd
 }
 
-/// Makes tangents unit and their signs 1 or −1; `none` tells that they had better be made anew.
+/// Normalises tangents and sets their signs to 1 or −1; `none` means that they should be regenerated.
 pub(super) fn repair_tangents(tangents: &mut [Vec4]) -> Odd {
     let mut odd = Odd::default();
     for tangent in tangents {
@@ -187,7 +188,7 @@ pub(super) fn repair_tangents(tangents: &mut [Vec4]) -> Odd {
     odd
 }
 
-/// Brings colours into 0…1; whether any was outside.
+/// Clamps colours to 0…1; returns whether any was outside.
 pub(super) fn clamp_colors(colors: &mut [Vec4]) -> bool {
     let mut outside = false;
     for color in colors {
@@ -198,7 +199,7 @@ pub(super) fn clamp_colors(colors: &mut [Vec4]) -> bool {
     outside
 }
 
-/// Makes texture coordinates finite; whether any was not.
+/// Replaces texture coordinates that are not finite by zero; returns whether there were any.
 pub(super) fn finite_uvs(uvs: &mut [Vec2]) -> bool {
     let mut odd = false;
     for uv in uvs.iter_mut().filter(|uv| !uv.is_finite()) {

@@ -1,12 +1,12 @@
-//! The gloss in the alpha of specular-glossiness maps, as the roughness that our materials read.
+//! Conversion of the glossiness in the alpha channel of specular-glossiness maps to roughness.
 //!
-//! Roughness is what gloss is missing to one (KHR_materials_pbrSpecularGlossiness), so a map of one is a map of the
-//! other, made once after decoding: roughness in green and no metal in blue, as metallic-roughness maps have them.
+//! Roughness is 1 − glossiness (KHR_materials_pbrSpecularGlossiness), so the map is converted once after decoding: roughness in
+//! green and a metallic factor of 0 in blue, as in metallic-roughness maps.
 
 use crate::huge_pages::Paged;
 use crate::scene::{Bitmap, Pixels};
 
-/// The roughness of a picture in whose alpha gloss is a part of `gloss`, 0 … 1. One texel where there is no alpha.
+/// Map of the roughness 1 − `gloss` × alpha of a picture, with `gloss` in 0 … 1. One texel where there is no alpha.
 pub(super) fn roughness(picture: &Bitmap, gloss: f32) -> Bitmap {
     let Bitmap { name, width, height, .. } = picture;
     let (width, height, pixels) = match &picture.pixels {

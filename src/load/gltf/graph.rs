@@ -1,4 +1,4 @@
-//! The node hierarchy: a forest, or refused; and where each node stands, composed in `f64`.
+//! The node hierarchy, which has to be a forest, and the world transform of each node, composed in `f64`.
 
 use super::codes::Code;
 use super::report::Report;
@@ -8,19 +8,19 @@ use crate::math::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Parents and places of all nodes, in a scene or not.
+/// Parents and transforms of all nodes, in a scene or not.
 pub(super) struct Graph {
     /// The parent of each node.
     parents: Vec<Option<usize>>,
-    /// Nodes numbered so that what hangs on a node has the numbers of this range, the node itself the first.
+    /// For each node, the range of preorder numbers of its subtree; the first is the node's own.
     family: Vec<Range<usize>>,
-    /// Where the numbers of each tree end, ascending.
+    /// End of the number range of each tree, ascending.
     tree_ends: Vec<usize>,
     /// All nodes, parents before their children.
     order: Vec<usize>,
-    /// From node to its parent's space, as the file says.
+    /// Transforms from a node to its parent's space, as in the file.
     local: Vec<Local>,
-    /// From node to world space.
+    /// Transforms from a node to world space.
     pub(super) world: Vec<DAffine3>,
 }
 
@@ -31,7 +31,7 @@ enum Local {
     Parts { translation: DVec3, rotation: DQuat, scale: DVec3 },
 }
 
-/// What an animation puts in the place of a node's own translation, rotation and scale.
+/// Replacements by an animation for a node's translation, rotation and scale.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Moved {
     pub(super) translation: Option<DVec3>,
@@ -41,7 +41,7 @@ pub(super) struct Moved {
 }
 
 impl Local {
-    /// The transform of a node that is moved; a matrix stays as it is.
+    /// Transform of a node with animated parts; a matrix stays unchanged.
     fn affine(self, moved: Moved) -> DAffine3 {
         match self {
             Self::Matrix(affine) => affine,
@@ -73,7 +73,7 @@ impl Graph {
         graph
     }
 
-    /// Composes all places anew with some nodes moved.
+    /// Recomputes all world transforms with the animated parts of some nodes.
     pub(super) fn place(&mut self, moved: &HashMap<usize, Moved>) {
         let of = |node: usize| moved.get(&node).copied().unwrap_or_default();
         self.world = self.local.iter().enumerate().map(|(node, local)| local.affine(of(node))).collect();
@@ -84,17 +84,17 @@ impl Graph {
         }
     }
 
-    /// Whether a node's transform is a matrix, which has no parts that could be moved.
+    /// Returns whether a node's transform is a matrix, which has no parts to animate.
     pub(super) fn has_matrix(&self, node: usize) -> bool {
         matches!(self.local.get(node), Some(Local::Matrix(_)))
     }
 
-    /// Nodes without a parent.
+    /// Returns the nodes without a parent.
     pub(super) fn roots(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.parents.len()).filter(|&i| self.parents[i].is_none())
     }
 
-    /// The smallest range of numbers that holds all of some nodes; `None` when there are none.
+    /// Smallest range of preorder numbers that contains these nodes; `None` when there are none.
     pub(super) fn span(&self, nodes: impl Iterator<Item = usize>) -> Option<Range<usize>> {
         let numbers = nodes.filter_map(|node| Some(self.family.get(node)?.start));
         numbers.fold(None, |span: Option<Range<usize>>, n| {
@@ -102,17 +102,17 @@ impl Graph {
         })
     }
 
-    /// Whether everything in a span hangs on this node, or is it.
+    /// Returns whether all nodes of a span are in the subtree of this node.
     pub(super) fn holds(&self, node: usize, span: &Range<usize>) -> bool {
         self.family.get(node).is_some_and(|family| family.start <= span.start && span.end <= family.end)
     }
 
-    /// Whether everything in a span hangs on one node.
+    /// Returns whether all nodes of a span are in one tree.
     pub(super) fn is_one_tree(&self, span: &Range<usize>) -> bool {
         self.tree_ends.get(self.tree_at(span.start)).is_some_and(|&end| span.end <= end)
     }
 
-    /// A number for the tree that a node is in.
+    /// Index of the tree that contains a node.
     pub(super) fn tree(&self, node: usize) -> usize {
         self.family.get(node).map_or(usize::MAX, |family| self.tree_at(family.start))
     }
@@ -133,7 +133,7 @@ fn parents(nodes: &[Value], report: &mut Report) -> Vec<Option<usize>> {
         for (k, child) in indices(node, "children").enumerate() {
             match parents.get_mut(child) {
                 Some(slot @ None) => *slot = Some(i),
-                // The same child twice in one list is told as a duplicate.
+                // A child listed twice by one node is reported as a duplicate.
                 Some(Some(other)) if *other != i => {
                     let text = format!("node {child} is already a child of node {other}");
                     report.add(Code::NodeParentOverride, format!("nodes[{i}].children[{k}]"), text);
@@ -145,9 +145,9 @@ fn parents(nodes: &[Value], report: &mut Report) -> Vec<Option<usize>> {
     parents
 }
 
-/// Refuses every loop of parents, each named once.
+/// Refuses every loop of parents, reporting each once.
 fn refuse_loops(parents: &[Option<usize>], report: &mut Report) {
-    // Which walk came by first; a walk that meets itself has found a loop.
+    // The first walk to visit each node; a walk that meets itself has found a loop.
     let mut walk_of = vec![usize::MAX; parents.len()];
     for start in 0..parents.len() {
         let mut next = Some(start);
@@ -172,7 +172,7 @@ fn check_scenes(root: &Value, parents: &[Option<usize>], report: &mut Report) {
     }
 }
 
-/// The transform of one node, from its matrix or its translation, rotation and scale.
+/// Transform of one node, from its matrix or its translation, rotation and scale.
 fn local(i: usize, node: &Value, report: &mut Report) -> Local {
     let trs = ["translation", "rotation", "scale"].iter().any(|name| node.get(name).is_some());
     if let Some(columns) = numbers::<16>(node, "matrix") {
@@ -200,15 +200,15 @@ fn from_columns(i: usize, columns: &[f64; 16], report: &mut Report) -> DAffine3 
 }
 
 fn is_sheared(m: DMat3) -> bool {
-    /// Cosine between axes that rounding to six digits leaves well below.
+    /// Largest cosine between orthogonal axes; rounding to six digits stays well below.
     const SQUARE: f64 = 1e-3;
     let skew = |a: DVec3, b: DVec3| a.dot(b).abs() > SQUARE * (a.length() * b.length());
     skew(m.x_axis, m.y_axis) || skew(m.y_axis, m.z_axis) || skew(m.x_axis, m.z_axis)
 }
 
-/// A unit quaternion in the same direction; none for zero.
+/// Normalises a quaternion; the identity for zero.
 fn unit(i: usize, q: DQuat, report: &mut Report) -> DQuat {
-    /// Rounding to `f32` and to six digits stays below.
+    /// Tolerance of unit length; rounding to `f32` and to six digits stays below.
     const UNIT: f64 = 1e-3;
     let length = q.length();
     if (length - 1.0).abs() > UNIT {
@@ -218,15 +218,15 @@ fn unit(i: usize, q: DQuat, report: &mut Report) -> DQuat {
     if length > 0.0 { q / length } else { DQuat::IDENTITY }
 }
 
-/// `N` numbers of a property.
+/// The `N` numbers of a property; `None` if it is missing or has another length.
 fn numbers<const N: usize>(node: &Value, name: &str) -> Option<[f64; N]> {
     let list: Vec<f64> = node.get(name)?.as_array()?.iter().filter_map(Value::as_f64).collect();
     list.try_into().ok()
 }
 
-/// All nodes, parents before their children; found without recursion, however deep the hierarchy is.
+/// Sorts all nodes, parents before children, without recursion, however deep the hierarchy is.
 ///
-/// Where a loop is entered does not matter: it has refused the file already.
+/// The order within a loop does not matter: a loop has already refused the file.
 fn order(parents: &[Option<usize>]) -> Vec<usize> {
     let mut seen = vec![false; parents.len()];
     let (mut order, mut chain) = (Vec::with_capacity(parents.len()), Vec::new());
@@ -241,7 +241,7 @@ fn order(parents: &[Option<usize>]) -> Vec<usize> {
     order
 }
 
-/// Numbers the nodes so that every node and what hangs on it have numbers in a row.
+/// Assigns preorder numbers, by which every subtree is a contiguous range.
 fn families(parents: &[Option<usize>], order: &[usize]) -> Vec<Range<usize>> {
     let mut sizes = vec![1; parents.len()];
     for &node in order.iter().rev() {
@@ -249,7 +249,7 @@ fn families(parents: &[Option<usize>], order: &[usize]) -> Vec<Range<usize>> {
             sizes[parent] += sizes[node];
         }
     }
-    // Where the next child of a node starts; the last one is for nodes without a parent.
+    // Start of the next child's range for each node; the last entry is for nodes without a parent.
     let mut free = vec![0; parents.len() + 1];
     let mut families = vec![0..0; parents.len()];
     for &node in order {

@@ -1,4 +1,4 @@
-//! The encoded pictures of a file: found, checked against what is declared of them, decoded where they are drawn.
+//! The encoded pictures of a file: located, checked against their declarations, and decoded where they are drawn.
 
 use super::buffers::{Buffers, decode_data, is_data, media_type};
 use super::codes::Code;
@@ -19,15 +19,15 @@ use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// The bytes of every image that is drawn or lies in the file itself.
+/// Bytes of every image that is drawn or embedded in the file.
 pub(super) struct Images<'a> {
     bytes: Vec<Option<Cow<'a, [u8]>>>,
-    /// Images that name the same file as an earlier one, which holds the bytes.
+    /// Images that name the same file as an earlier one, and the index of that one, which holds the bytes.
     same: HashMap<usize, usize>,
 }
 
 impl<'a> Images<'a> {
-    /// Finds the bytes; other files are read only for images that are drawn or declare their type.
+    /// Loads the bytes; external files are read only for images that are drawn or declare their type.
     pub(super) fn load(
         root: &Root,
         buffers: &'a Buffers<'a>,
@@ -49,7 +49,7 @@ impl<'a> Images<'a> {
                 images.bytes.push(None);
             } else {
                 images.bytes.push(find.bytes(i, image, drawn));
-                // What was looked for once is not looked for again, found or not.
+                // Each name is looked up only once, found or not.
                 known.extend(named.filter(|_| is_wanted(image, drawn)).map(|uri| (uri, i)));
             }
             if let Some(bytes) = images.of(i) {
@@ -60,12 +60,12 @@ impl<'a> Images<'a> {
         images
     }
 
-    /// The bytes of an image.
+    /// Bytes of an image, if they were loaded.
     fn of(&self, i: usize) -> Option<&[u8]> {
         self.bytes.get(self.same.get(&i).copied().unwrap_or(i)).and_then(Option::as_deref)
     }
 
-    /// Makes these pictures of images that are decoded once each, and tells the time that took.
+    /// Makes the requested pictures, decoding each image once; also returns the time that took.
     pub(super) fn decode(
         &self,
         root: &Root,
@@ -96,7 +96,7 @@ impl<'a> Images<'a> {
                 }
             }
         }
-        // What is as it was decoded goes last, for then nothing is made of it any more.
+        // Unchanged bitmaps are taken last, when no roughness map is derived from them any more.
         for (made, picture) in made.iter_mut().zip(drawn).filter(|(_, picture)| picture.gloss().is_none()) {
             *made = place(picture).and_then(|at| bitmaps[at].take());
         }
@@ -104,10 +104,10 @@ impl<'a> Images<'a> {
     }
 }
 
-/// Takes what the roughness of a picture needs.
+/// Charges the memory of a picture's roughness map.
 fn charge(bitmap: &Bitmap, limits: &Limits, budget: &mut Budget) -> Result<(), Unusable> {
     let bytes = match bitmap.pixels {
-        // Without alpha it is one texel.
+        // Without alpha the map is one texel.
         Pixels::Rgb8(_) => return Ok(()),
         Pixels::Rgba8(_) => 4,
         Pixels::Rgba16(_) => 8,
@@ -115,7 +115,7 @@ fn charge(bitmap: &Bitmap, limits: &Limits, budget: &mut Budget) -> Result<(), U
     take_memory(bitmap.width, bitmap.height, bytes, 0, limits, budget)
 }
 
-/// Where the bytes of one image are looked for.
+/// Sources of images' bytes.
 struct Find<'a, 'b> {
     buffers: &'a Buffers<'a>,
     files: Reader<'b>,
@@ -149,7 +149,7 @@ impl<'a> Find<'a, '_> {
         None
     }
 
-    /// Whether so many bytes may still be taken; else the image is left out with a warning.
+    /// Charges `bytes` to the budget; if they exceed it, the image is left out with a warning.
     fn fits(&mut self, i: usize, bytes: usize) -> bool {
         let Err(over) = self.budget.take(bytes as u64, 1) else { return true };
         self.leave_out(i, over);
@@ -181,7 +181,7 @@ impl<'a> Find<'a, '_> {
     }
 }
 
-/// Whether another file is worth reading: to be drawn, or to be compared with the type that is declared.
+/// Returns whether an external file should be read: to be drawn, or to check its declared type.
 fn is_wanted(image: &Image, drawn: bool) -> bool {
     drawn || image.mime_type.is_some()
 }
@@ -191,7 +191,7 @@ fn name_of(i: usize, image: &Image) -> String {
     uri.or(image.name.as_ref()).filter(|n| !n.is_empty()).cloned().unwrap_or_else(|| format!("images[{i}]"))
 }
 
-/// The media type that the bytes of an image of this name turn out to have, of those that glTF files hold.
+/// Media type of an image by its bytes and name, among the kinds that glTF files contain.
 fn kind_of(name: &str, bytes: &[u8]) -> Option<&'static str> {
     match format_of(name, bytes) {
         Some(ImageFormat::Png) => Some("image/png"),
@@ -205,11 +205,11 @@ fn kind_of(name: &str, bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// Kinds of images that only textures with an extension may show: the extension, the media type, and the kind's name.
+/// Kinds of images that only textures with an extension may use: extension, media type, name.
 const EXTENDED: [(&str, &str, &str); 2] =
     [("EXT_texture_webp", "image/webp", "WebP"), ("KHR_texture_basisu", "image/ktx2", "KTX2")];
 
-/// Compares what an image says of itself with its bytes.
+/// Compares the declared type of an image with its bytes.
 fn check_kind(root: &Root, i: usize, image: &Image, bytes: &[u8], report: &mut Report) {
     let place = format!("images[{i}]");
     let Some(kind) = kind_of(&name_of(i, image), bytes) else {
@@ -227,7 +227,7 @@ fn check_kind(root: &Root, i: usize, image: &Image, bytes: &[u8], report: &mut R
     }
 }
 
-/// Checks that each way to name an image leads to one of its kind.
+/// Checks that each reference of a texture leads to an image of the kind that it requires.
 fn check_textures(root: &Root, images: &Images, report: &mut Report) {
     let kind = |i: usize| kind_of(&name_of(i, root.images.get(i)?), images.of(i)?);
     for (i, texture) in root.textures.iter().enumerate() {
@@ -252,8 +252,8 @@ fn extension_source(texture: &Texture, name: &str) -> Option<usize> {
     position(extensions.others.get(name)?.get("source")?)
 }
 
-/// The image that a texture shows: WebP where the file offers it, then the plain one, then KTX2, which has lost something
-/// to its compression, then what cannot be decoded.
+/// Image of a texture, in order of preference: WebP, the plain one, KTX2, whose compression loses detail, and at last DDS, which
+/// cannot be decoded.
 pub(super) fn image_of(root: &Root, texture: Index<Texture>) -> Option<usize> {
     let texture = root.textures.get(texture.value())?;
     let plain = Some(texture.source.value()).filter(|&i| i < root.images.len());

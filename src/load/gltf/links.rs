@@ -1,5 +1,5 @@
-//! What parts of the document mean together: accessors fit their views, attributes have formats that can be read,
-//! references agree. Data itself is looked at where it is read.
+//! Consistency between parts of the document: accessors fit their views, have readable formats, references agree. The data
+//! itself is checked where it is read.
 
 use super::accessor::Format;
 use super::codes::Code;
@@ -85,7 +85,7 @@ fn bounds_length(accessor: &Accessor, format: Format, place: &str, report: &mut 
     }
 }
 
-/// Elements in a view.
+/// Elements of an accessor in a view.
 struct Run {
     offset: u64,
     stride: u64,
@@ -299,12 +299,12 @@ fn skins(root: &Root, report: &mut Report) {
     }
 }
 
-/// Whether inverse bind matrices may have this format.
+/// Returns whether inverse bind matrices may have this format.
 pub(super) fn is_bind_matrix(format: Format) -> bool {
     format.component == ComponentType::F32 && format.shape == Type::Mat4
 }
 
-/// Whether an accessor's view has a stride.
+/// Returns whether an accessor's view has a stride.
 pub(super) fn has_stride(root: &Root, accessor: &Accessor) -> bool {
     let view: Option<Index<buffer::View>> = accessor.buffer_view;
     view.and_then(|view| root.buffer_views.get(view.value())).is_some_and(|view| view.byte_stride.is_some())

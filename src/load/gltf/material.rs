@@ -1,4 +1,4 @@
-//! Materials: metallic-roughness with its extensions, and unlit.
+//! Materials: metallic-roughness with its extensions, specular-glossiness, and unlit.
 
 use super::mesh::Needs;
 use super::textures::Textures;
@@ -12,13 +12,13 @@ use gltf::json::material as source;
 use gltf::json::validation::Checked;
 use serde_json::Value;
 
-/// A closed volume that bends light and may absorb it.
+/// A closed volume that refracts light and may absorb it.
 const VOLUME: &str = "KHR_materials_volume";
 
-/// Another way to describe a surface, beside which metallic-roughness is what programs draw that do not know it.
+/// Alternative surface model; metallic-roughness beside it is the fallback for programs without it.
 const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 
-/// Converts a material; its maps are noted in `textures`.
+/// Converts a material and registers its maps in `textures`.
 pub(super) fn convert(source: &json::Material, textures: &mut Textures) -> Material {
     let is_unlit = source.extensions.as_ref().is_some_and(|e| e.unlit.is_some());
     let extensions = source.extensions.as_ref().filter(|_| !is_unlit);
@@ -44,17 +44,17 @@ pub(super) fn convert(source: &json::Material, textures: &mut Textures) -> Mater
     material
 }
 
-/// What vertices need for a material's maps.
+/// Vertex attributes that a material's maps need.
 pub(super) fn needs(material: &Material) -> Needs {
     let m = material.metal_rough();
     let of_coat = m.and_then(|m| m.coat.as_ref()?.normal_map.as_ref());
     let anisotropy = m.and_then(|m| m.anisotropy.as_ref());
-    // It follows coordinates as they are: the transform of a map moves what that says.
+    // Anisotropy follows untransformed coordinates: the transform of a map moves only its texels.
     let along = |map: &TextureRef| match anisotropy {
         Some(_) => TexCoords { set: map.uv_set, ..TexCoords::default() },
         None => map.coordinates(),
     };
-    // One without a map runs along the tangents of the first set.
+    // Anisotropy without a map follows the tangents of the first set.
     let of_anisotropy = anisotropy.map(|anisotropy| anisotropy.map.as_ref().map(along).unwrap_or_default());
     let tangents = material.normal_map.as_ref().or(of_coat).map(along).or(of_anisotropy);
     let mut uv_sets: Vec<u32> =
@@ -64,7 +64,7 @@ pub(super) fn needs(material: &Material) -> Needs {
     Needs { uv_sets, tangents }
 }
 
-/// `value` in `low..=high`; `otherwise` when it is not a number.
+/// Clamps `value` to `low..=high`; `otherwise` for NaN.
 fn within(value: f32, low: f32, high: f32, otherwise: f32) -> f32 {
     if value.is_nan() { otherwise } else { value.clamp(low, high) }
 }
@@ -79,7 +79,7 @@ fn alpha_mode(source: &json::Material) -> AlphaMode {
     }
 }
 
-/// Colour and opacity.
+/// Converts base colour and opacity.
 fn base(source: &json::Material, material: &mut Material, textures: &mut Textures) {
     let pbr = &source.pbr_metallic_roughness;
     let [r, g, b, a] = pbr.base_color_factor.0.map(|c| within(c, 0.0, 1.0, 1.0));
@@ -87,7 +87,7 @@ fn base(source: &json::Material, material: &mut Material, textures: &mut Texture
     material.base_color_map = textures.info(pbr.base_color_texture.as_ref());
 }
 
-/// Emission, normal and occlusion.
+/// Converts emission, normal and occlusion.
 fn lit(source: &json::Material, material: &mut Material, textures: &mut Textures) {
     let strength = source.extensions.as_ref().and_then(|e| e.emissive_strength.as_ref());
     let strength = strength.map_or(1.0, |s| within(s.emissive_strength.0, 0.0, f32::MAX, 1.0));
@@ -108,7 +108,7 @@ fn lit(source: &json::Material, material: &mut Material, textures: &mut Textures
     }
 }
 
-/// KHR_texture_transform on slots where the typed document keeps it untyped.
+/// Parses KHR_texture_transform in slots where the typed document keeps it untyped.
 fn transform(others: Option<&serde_json::Map<String, Value>>) -> Option<json::extensions::texture::TextureTransform> {
     let value = others?.get("KHR_texture_transform")?;
     serde_json::from_value(value.clone()).ok()
@@ -130,7 +130,7 @@ fn metal_rough(source: &json::Material, textures: &mut Textures) -> MetalRough {
         surface.specular_color_map = textures.info(specular.specular_color_texture.as_ref());
     }
     if let Some(ior) = &extensions.ior {
-        // Below 1 only the special case 0 means something.
+        // Below 1 only 0 has a meaning, as a special case.
         surface.ior = if ior.ior.0 == 0.0 { 0.0 } else { within(ior.ior.0, 1.0, f32::MAX, 1.5) };
     }
     if let Some(transmission) = &extensions.transmission {
@@ -165,19 +165,19 @@ fn metal_rough(source: &json::Material, textures: &mut Textures) -> MetalRough {
     surface
 }
 
-/// A number in an extension's object, kept within limits.
+/// A number of an extension, clamped to a range.
 fn number_of(extension: &Value, name: &str, default: f32, (low, high): (f32, f32)) -> f32 {
     extension.get(name).and_then(Value::as_f64).map_or(default, |x| within(x as f32, low, high, default))
 }
 
-/// A colour in an extension's object, 0 … 1; parts that are not there are as by default.
+/// A colour of an extension, clamped to 0 … 1; missing components are `default`.
 fn color_of(extension: &Value, name: &str, default: f32) -> Vec3 {
     let color = extension.get(name);
     let part = |k: usize| color.and_then(|color| color.get(k)?.as_f64());
     Vec3::from([0, 1, 2].map(|k| part(k).map_or(default, |c| within(c as f32, 0.0, 1.0, default))))
 }
 
-/// KHR_materials_anisotropy; `None` where its strength is zero.
+/// Converts KHR_materials_anisotropy; `None` where its strength is zero.
 fn anisotropy(extension: &Value, textures: &mut Textures) -> Option<Anisotropy> {
     let strength = number_of(extension, "anisotropyStrength", 0.0, (0.0, 1.0));
     (strength > 0.0).then(|| Anisotropy {
@@ -187,7 +187,7 @@ fn anisotropy(extension: &Value, textures: &mut Textures) -> Option<Anisotropy> 
     })
 }
 
-/// KHR_materials_iridescence; `None` where its strength is zero.
+/// Converts KHR_materials_iridescence; `None` where its strength is zero.
 fn iridescence(extension: &Value, textures: &mut Textures) -> Option<Iridescence> {
     let strength = number_of(extension, "iridescenceFactor", 0.0, (0.0, 1.0));
     let thickness = |name: &str, default| number_of(extension, name, default, (0.0, f32::MAX));
@@ -201,7 +201,7 @@ fn iridescence(extension: &Value, textures: &mut Textures) -> Option<Iridescence
     })
 }
 
-/// KHR_materials_sheen; `None` where its colour is black.
+/// Converts KHR_materials_sheen; `None` where its colour is black.
 fn sheen(extension: &Value, textures: &mut Textures) -> Option<Sheen> {
     let color = color_of(extension, "sheenColorFactor", 0.0);
     let mut map = |name: &str| map_of(extension, name, textures);
@@ -213,7 +213,7 @@ fn sheen(extension: &Value, textures: &mut Textures) -> Option<Sheen> {
     })
 }
 
-/// KHR_materials_diffuse_transmission; `None` where nothing goes through.
+/// Converts KHR_materials_diffuse_transmission; `None` where nothing is transmitted.
 fn diffuse_transmission(extension: &Value, textures: &mut Textures) -> Option<DiffuseTransmission> {
     let share = number_of(extension, "diffuseTransmissionFactor", 0.0, (0.0, 1.0));
     let mut map = |name: &str| map_of(extension, name, textures);
@@ -225,7 +225,7 @@ fn diffuse_transmission(extension: &Value, textures: &mut Textures) -> Option<Di
     })
 }
 
-/// KHR_materials_clearcoat; `None` where its strength is zero.
+/// Converts KHR_materials_clearcoat; `None` where its strength is zero.
 fn coat(extension: &Value, textures: &mut Textures) -> Option<Coat> {
     let number = |name: &str| number_of(extension, name, 0.0, (0.0, 1.0));
     let strength = number("clearcoatFactor");
@@ -244,18 +244,18 @@ fn coat(extension: &Value, textures: &mut Textures) -> Option<Coat> {
     })
 }
 
-/// A map in an extension's object, as a texture of ours.
+/// A map of an extension, registered in `textures`.
 fn map_of(extension: &Value, name: &str, textures: &mut Textures) -> Option<TextureRef> {
     textures.info(info_of(Some(extension), name).as_ref())
 }
 
-/// A map in an extension's object.
+/// A map of an extension, as in the document.
 fn info_of(extension: Option<&Value>, name: &str) -> Option<json::texture::Info> {
     serde_json::from_value(extension?.get(name)?.clone()).ok()
 }
 
-/// KHR_materials_pbrSpecularGlossiness as a dielectric whose reflection has the given colour at normal incidence, the
-/// way KHR_materials_ior describes for its special index 0. What else the material says is a fallback.
+/// Converts KHR_materials_pbrSpecularGlossiness to a dielectric whose reflectance at normal incidence is the specular colour, by
+/// the special index 0 of KHR_materials_ior. The material's other properties are a fallback and unused.
 fn from_specular_glossiness(extension: &Value, material: &mut Material, textures: &mut Textures) -> MetalRough {
     let opacity = extension.get("diffuseFactor").and_then(|color| color.get(3)?.as_f64());
     let mut map = |name: &str| map_of(extension, name, textures);
@@ -267,7 +267,7 @@ fn from_specular_glossiness(extension: &Value, material: &mut Material, textures
     let metal_rough_map = textures.roughness(info_of(Some(extension), "specularGlossinessTexture").as_ref(), gloss);
     MetalRough {
         metallic: 0.0,
-        // The map has all of it.
+        // The map contains the glossiness factor, too.
         roughness: if metal_rough_map.is_some() { 1.0 } else { 1.0 - gloss },
         metal_rough_map,
         specular_color: color_of(extension, "specularFactor", 1.0),

@@ -1,16 +1,16 @@
-//! Parts that a picture can do without, taken out of the JSON where they are not what the format says.
+//! Removal of invalid parts from the JSON that a picture can do without.
 //!
-//! What programs write for "not given", `null` and an index of −1, goes before anything looks at it. Then the schema is
-//! checked: a property of a material, a texture, a sampler or a light that breaks it goes, and with it whatever cannot be
-//! without it (a reference to a texture without its index); so does a name that is none. Nothing else of what holds the shape
-//! of a model together is mended but the length of a buffer, where its bytes are there.
+//! First, what programs write for "not given", `null` and an index of −1, is removed. Then the schema is checked: invalid
+//! properties of materials, textures, samplers and lights are removed, together with what depends on them (a reference to a
+//! texture without its index), and so are invalid names. Of what determines the shape of a model, only the length of a buffer is
+//! mended, if its bytes exist.
 
 use super::codes::Code;
 use super::report::Report;
 use super::schema;
 use super::tree::{Map, Value};
 
-/// Properties that are indices, and may be left out.
+/// Optional properties that are indices.
 const INDICES: [&str; 13] = [
     "bufferView",
     "camera",
@@ -27,7 +27,7 @@ const INDICES: [&str; 13] = [
     "texCoord",
 ];
 
-/// Takes out what says that nothing is given.
+/// Removes values that mean "not given".
 pub(super) fn take_out_blanks(root: &mut Value, report: &mut Report) {
     let nodes = root.get_mut("nodes").and_then(Value::as_array_mut).into_iter().flatten();
     let blank_nodes: u64 = nodes.filter(|node| **node == Value::Null).map(|node| (*node = nothing(), 1).1).sum();
@@ -39,7 +39,8 @@ pub(super) fn take_out_blanks(root: &mut Value, report: &mut Report) {
     }
 }
 
-/// Takes out of what the format defines; what may be anything, `extras` and extensions that are not read, is not looked into.
+/// Removes blanks from what the format defines, and counts them; `extras` and unknown extensions, which may contain anything,
+/// are skipped.
 fn blanks_in(value: &mut Value) -> u64 {
     match value {
         Value::Object(map) => {
@@ -65,12 +66,12 @@ fn blanks_in(value: &mut Value) -> u64 {
     }
 }
 
-/// Whether a number is −1.
+/// Returns whether a value is −1.
 fn is_none(value: &Value) -> bool {
     value.as_f64() == Some(-1.0)
 }
 
-/// Makes the first buffer of a GLB as long as the chunk that holds it, where it is said to be shorter than its views need.
+/// Extends the declared length of a GLB's first buffer to its chunk, where it is shorter than its views need.
 pub(super) fn lengthen_buffer(root: &mut Value, chunk: Option<&[u8]>, report: &mut Report) {
     let whole = |value: &Value, name: &str| value.get(name).and_then(schema::whole);
     let views = schema::list(root, "bufferViews").iter().filter(|view| whole(view, "buffer") == Some(0));
@@ -94,14 +95,14 @@ fn first_buffer<'r, 'a>(root: &'r mut Value<'a>) -> Option<&'r mut Map<'a>> {
     root.get_mut("buffers")?.element_mut(0)?.as_object_mut()
 }
 
-/// An object that says nothing.
+/// An empty object.
 fn nothing() -> Value<'static> {
     Value::Object(Map::default())
 }
 
-/// Checks the schema, and takes out what breaks it in parts that can be left out.
+/// Checks the schema, and removes invalid values from parts that can be left out.
 pub(super) fn check(root: &mut Value, report: &mut Report) {
-    /// A property, what cannot be without it, and what cannot be without that.
+    /// Most rounds of removal: a property, what depends on it, and what depends on that.
     const ROUNDS: usize = 4;
     report.leave_out(true);
     schema::check(root, report);
@@ -112,21 +113,21 @@ pub(super) fn check(root: &mut Value, report: &mut Report) {
             return;
         }
         places.iter().for_each(|place| take_out(root, place));
-        // Only what now lacks something is new.
+        // Only faults caused by the removal are new.
         let mut again = Report::new(report.file());
         again.leave_out(true);
         schema::check(root, &mut again);
         places = again.take_left_out();
         report.take_faults(again);
     }
-    // What is still broken is beyond mending: it is refused.
+    // What is still invalid cannot be mended and is refused.
     if !places.is_empty() {
         schema::check(root, report);
     }
 }
 
-/// Takes out the value at a JSON path; of a list at the root an element becomes one that says nothing, of a list elsewhere the
-/// list goes.
+/// Removes the value at a JSON path. An element of a list at the root becomes an empty object; an element of another list takes
+/// the whole list with it.
 fn take_out(root: &mut Value, place: &str) {
     let Some((parent, last)) = place.rsplit_once('.') else {
         // An element of a list at the root.
@@ -137,19 +138,19 @@ fn take_out(root: &mut Value, place: &str) {
     let (name, is_element) = last.split_once('[').map_or((last, false), |(name, _)| (name, true));
     let Some(map) = parent.and_then(Value::as_object_mut) else { return };
     match step_in(map, last) {
-        // One that does not say what it is is dark.
+        // Except a light, which becomes a dark one.
         Some(light) if is_element && name == "lights" => *light = dark_light(),
         _ => map.remove(name),
     }
 }
 
-/// A light must say what it is.
+/// A light without intensity, with the type that is required.
 fn dark_light() -> Value<'static> {
     let members = [("type", Value::String("point".into())), ("intensity", 0.into())];
     Value::Object(members.into_iter().collect())
 }
 
-/// What a step of a path, `name` or `name[3]`, leads to.
+/// Follows a step of a path, `name` or `name[3]`.
 fn step<'r, 'a>(value: &'r mut Value<'a>, step: &str) -> Option<&'r mut Value<'a>> {
     step_in(value.as_object_mut()?, step)
 }

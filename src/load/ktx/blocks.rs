@@ -1,4 +1,4 @@
-//! Pixels row after row, and in blocks of 4×4.
+//! Pixels of one level, in rows or in blocks of 4×4.
 
 use crate::scene::Pixels;
 
@@ -7,19 +7,19 @@ use crate::scene::Pixels;
 pub(super) enum Layout {
     Rgb,
     Rgba,
-    /// Blocks of 8 bytes; whether their fourth colour may be a hole.
+    /// Blocks of 8 bytes; `alpha`: the fourth colour of a block may be transparent.
     Bc1 {
         alpha: bool,
     },
     /// Blocks of 16 bytes.
     Bc3,
     Bc7,
-    /// Blocks of 16 bytes that are not read here.
+    /// Blocks of 16 bytes that are not decoded here: UASTC.
     Blocks16,
 }
 
 impl Layout {
-    /// Bytes of a picture.
+    /// Size of a picture in bytes.
     pub(super) fn bytes(self, width: u32, height: u32) -> u64 {
         let pixels = u64::from(width) * u64::from(height);
         let blocks = u64::from(width.div_ceil(4)) * u64::from(height.div_ceil(4));
@@ -32,10 +32,10 @@ impl Layout {
     }
 }
 
-/// The pixels of a picture, from as many bytes as [`Layout::bytes`] says.
+/// Decodes the pixels of a picture from exactly [`Layout::bytes`] bytes.
 ///
 /// # Errors
-/// When there are fewer, or the layout is not one to be read here.
+/// If the number of bytes differs, or the layout cannot be decoded here.
 pub(super) fn pixels_of(layout: Layout, bytes: &[u8], width: u32, height: u32) -> Result<Pixels, String> {
     if bytes.len() as u64 != layout.bytes(width, height) {
         return Err("its pixels are cut off".into());
@@ -55,14 +55,14 @@ pub(super) fn pixels_of(layout: Layout, bytes: &[u8], width: u32, height: u32) -
     })
 }
 
-/// Decodes blocks of `N` bytes, row by row; what of them lies outside is left out.
+/// Decodes blocks of `N` bytes, row by row; texels outside the picture are dropped.
 fn blocks<const N: usize>(
     bytes: &[u8],
     width: usize,
     height: usize,
     decode: fn(&[u8], &mut [u8], usize),
 ) -> Vec<[u8; 4]> {
-    /// Bytes of a row of a block, and of all four.
+    /// Bytes of one row of texels in a block; a block has four.
     const ROW: usize = 4 * 4;
     let mut out = vec![[0; 4]; width * height];
     let columns = width.div_ceil(4);

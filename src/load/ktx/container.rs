@@ -1,4 +1,4 @@
-//! The container: what it holds, and the bytes of its largest level.
+//! The container: its header, and the bytes of its largest level.
 
 use super::Size;
 use super::blocks::{Layout, pixels_of};
@@ -8,7 +8,7 @@ use ::ktx2::{ColorModel, Format, Reader, SupercompressionScheme};
 use std::borrow::Cow;
 use std::io::Read;
 
-/// A file whose header makes sense.
+/// A file whose header is valid.
 pub(super) struct Container<'a> {
     reader: Reader<&'a [u8]>,
     width: u32,
@@ -22,15 +22,15 @@ pub(super) struct Container<'a> {
 enum Content {
     /// Basis Universal; the library reads the container itself.
     Basis,
-    /// Anything else, after unpacking.
+    /// Pixels or blocks in this layout, once unpacked.
     Plain(Layout),
 }
 
 impl<'a> Container<'a> {
-    /// Reads the header and compares the lengths that it tells.
+    /// Reads the header and checks the lengths that it states.
     ///
     /// # Errors
-    /// What is wrong with it, or why its pixels cannot be read.
+    /// What is wrong with the header, or why the pixels cannot be read.
     pub(super) fn read(bytes: &'a [u8]) -> Result<Self, String> {
         let reader = Reader::new(bytes).map_err(|e| format!("its KTX2 header is damaged: {e}"))?;
         let header = reader.header();
@@ -55,18 +55,18 @@ impl<'a> Container<'a> {
         Ok(Self { width, height, content, is_packed, reader })
     }
 
-    /// What decoding takes.
+    /// Size of the picture, and memory that decoding takes.
     pub(super) fn size(&self) -> Size {
         let (width, height) = (self.width, self.height);
         let stored = match self.content {
-            // Its blocks, unpacked, and its pixels before they are copied.
+            // The unpacked blocks, and the decoded pixels before they are copied.
             Content::Basis => Layout::Blocks16.bytes(width, height) + u64::from(width) * u64::from(height) * 4,
             Content::Plain(layout) => layout.bytes(width, height),
         };
         Size { width, height, between: stored }
     }
 
-    /// The pixels of the largest level.
+    /// Decodes the largest level.
     pub(super) fn pixels(&self) -> Result<Pixels, String> {
         match self.content {
             Content::Basis => self.transcoded(),
@@ -91,7 +91,7 @@ impl<'a> Container<'a> {
         })
     }
 
-    /// The level's bytes: `expected` of them.
+    /// Returns the bytes of the largest level, unpacked: `expected` bytes.
     fn unpacked(&self, expected: u64) -> Result<Cow<'_, [u8]>, String> {
         let level = self.reader.levels().next().map_or(&[][..], |level| level.data);
         if !self.is_packed {
@@ -108,7 +108,7 @@ impl<'a> Container<'a> {
     }
 }
 
-/// What a file holds, and how its level is laid out once unpacked; `None` for ETC1S, whose length depends on the data.
+/// Content of a file, and layout of its level once unpacked; `None` for ETC1S, whose length depends on the data.
 fn content(reader: &Reader<&[u8]>) -> Result<(Content, Option<Layout>), String> {
     let Some(format) = reader.header().format else {
         return match reader.color_model() {

@@ -1,10 +1,10 @@
 //! KTX 2.0 pictures (Khronos, *KTX File Format Specification*, version 2) -> [`Bitmap`]: flat ones, their largest level.
 //!
-//! Pixels come as Basis Universal has them (ETC1S, UASTC), as blocks (BC1, BC3, BC7) or as plain bytes; levels may be
-//! packed with Zstandard. Every length is compared with the size of the picture before anything is unpacked. Values stay
-//! as they are stored: the place that shows a picture says whether they are sRGB-coded.
+//! Pixels are Basis Universal (ETC1S, UASTC), blocks (BC1, BC3, BC7) or plain bytes; levels may be packed with Zstandard. Every
+//! length is compared with the size of the picture before anything is unpacked. Values stay as stored: whoever uses a picture
+//! decides whether they are sRGB-coded.
 //!
-//! Four libraries read them, behind the feature `basisu`; what they do with damaged files that pass our checks is caught.
+//! Four libraries decode the pixels, behind the feature `basisu`; their panics on damaged files that pass our checks are caught.
 
 #[cfg(feature = "basisu")]
 mod blocks;
@@ -15,35 +15,35 @@ pub(super) mod tests;
 
 use crate::scene::Bitmap;
 
-/// How a file of this kind begins.
+/// First bytes of a KTX 2.0 file.
 const START: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
 
-/// Whether these are the bytes of a KTX 2.0 file.
+/// Returns whether these are the bytes of a KTX 2.0 file.
 pub(super) fn is(bytes: &[u8]) -> bool {
     bytes.starts_with(START)
 }
 
-/// What decoding would take.
+/// Size of a picture, and memory that decoding takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Size {
     /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Bytes between the file and the pixels.
+    /// Bytes of intermediate data between the file and the pixels.
     pub between: u64,
 }
 
-/// Reads the header alone.
+/// Reads only the header.
 ///
 /// # Errors
-/// What is wrong with it, or why its pixels cannot be read.
+/// What is wrong with the header, or why the pixels cannot be read.
 #[cfg(feature = "basisu")]
 pub(super) fn size(bytes: &[u8]) -> Result<Size, String> {
     caught(|| container::Container::read(bytes).map(|container| container.size()))
 }
 
-/// Decodes the largest level; [`size`] was asked before.
+/// Decodes the largest level; the caller has checked [`size`].
 ///
 /// # Errors
 /// What is wrong with the file.
@@ -65,13 +65,13 @@ fn caught<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
 #[cfg(not(feature = "basisu"))]
 const MISSING: &str = "it is KTX2 (compressed for GPUs); build meshray with the feature 'basisu' to read it";
 
-/// Without the feature: says which.
+/// Stub without the feature: names it in the error.
 #[cfg(not(feature = "basisu"))]
 pub(super) fn size(_: &[u8]) -> Result<Size, String> {
     Err(MISSING.into())
 }
 
-/// Without the feature: says which.
+/// Stub without the feature: names it in the error.
 #[cfg(not(feature = "basisu"))]
 pub(super) fn decode(_: &str, _: &[u8]) -> Result<Bitmap, String> {
     Err(MISSING.into())

@@ -1,4 +1,4 @@
-//! Files made here, byte by byte, and what damages them.
+//! Files built byte by byte, and damaged ones.
 
 use super::*;
 use crate::load::limits::{Budget, Limits};
@@ -11,12 +11,12 @@ use proptest::test_runner::FileFailurePersistence;
 use std::borrow::Cow;
 use std::path::Path;
 
-/// A KTX2 file of one level. `model` is the colour model of its description.
+/// Builds a KTX2 file of one level. `model` is the colour model of its data format descriptor.
 pub(crate) fn file(format: u32, (width, height): (u32, u32), (scheme, model): (u32, u8), level: &[u8]) -> Vec<u8> {
     file_with(format, (width, height), (scheme, model), level, level.len() as u64)
 }
 
-/// The same, with another length for the level once unpacked.
+/// Like [`file`], with an explicit uncompressed length of the level.
 fn file_with(
     format: u32,
     (width, height): (u32, u32),
@@ -24,7 +24,7 @@ fn file_with(
     level: &[u8],
     unpacked: u64,
 ) -> Vec<u8> {
-    // A description of one sample: 4 bytes of length, 24 of a block's head, 16 of the sample.
+    // A descriptor of one sample: 4 bytes of total size, 24 of block header, 16 of the sample.
     let block = if model == 166 { 3 } else { 0 };
     let mut description = 44u32.to_le_bytes().to_vec();
     description.extend([0, 0, 0, 0, 2, 0, 40, 0, model, 1, 1, 0, block, block, 0, 0, 16, 0, 0, 0, 0, 0, 0, 0]);
@@ -44,12 +44,12 @@ fn file_with(
     out
 }
 
-/// A Zstandard frame that holds bytes as they are.
+/// A Zstandard frame of one raw block.
 fn zstd(bytes: &[u8]) -> Vec<u8> {
     let length = bytes.len() as u32;
     let mut out = vec![0x28, 0xb5, 0x2f, 0xfd, 0xa0];
     out.extend(length.to_le_bytes());
-    // The last block, raw.
+    // Header of the last block, of the raw type.
     out.extend(&(length << 3 | 1).to_le_bytes()[..3]);
     out.extend(bytes);
     out
@@ -83,7 +83,7 @@ fn plain_bytes_are_taken_as_they_are_packed_or_not() {
 
 #[test]
 fn blocks_are_laid_out_row_by_row_and_cut_at_the_edges() {
-    // BC1 of one colour each: red, green, blue, white as 5, 6 and 5 bits; 5×5 pixels take four blocks.
+    // BC1, one colour per block: red, green, blue, white in RGB565; 5×5 pixels take four blocks.
     let block = |color: u16| [color.to_le_bytes(), color.to_le_bytes(), [0, 0], [0, 0]].concat();
     let level: Vec<u8> = [0xf800, 0x07e0, 0x001f, 0xffff].into_iter().flat_map(block).collect();
     let Pixels::Rgb8(texels) = pixels(&file(131, (5, 5), (0, 128), &level)) else { panic!() };
@@ -99,7 +99,7 @@ fn blocks_are_laid_out_row_by_row_and_cut_at_the_edges() {
     assert!(matches!(pixels(&file(145, (4, 4), (0, 134), &level)), Pixels::Rgba8(p) if p[..] == [[0; 4]; 16]));
 }
 
-/// UASTC of mode 8, which is one colour: 5 bits of the mode, then four of 8 bits.
+/// A UASTC block of mode 8, one solid colour: 5 bits of mode, then four channels of 8 bits.
 fn uastc([r, g, b, a]: [u8; 4]) -> [u8; 16] {
     let bits = 0b10111 | u128::from(r) << 5 | u128::from(g) << 13 | u128::from(b) << 21 | u128::from(a) << 29;
     bits.to_le_bytes()
@@ -115,8 +115,8 @@ fn basis_blocks_become_pixels_packed_or_not() {
     }
 }
 
-/// A picture of 14×6 pixels in four colours, 8 columns and 4 rows of the first, as the encoder of Basis Universal writes
-/// it: ETC1S; the same with the lower part half transparent; and that as UASTC packed with Zstandard.
+/// A picture of 14×6 pixels in four colours, the first 8 columns wide and 4 rows high, as written by the Basis Universal
+/// encoder: as ETC1S, the same with the lower part 64/255 opaque, and that as UASTC packed with Zstandard.
 const ETC1S: &str = "\
     q0tUWCAyMLsNChoKAAAAAAEAAAAOAAAABgAAAAAAAAAAAAAAAQAAAAEAAAABAAAAaAAAACwAAACUAAAAJAAAALgAAAAAAAAAlAAAAAAAAABMAQ\
     AAAAAAAAQAAAAAAAAAAAAAAAAAAAAsAAAAAAAAAAIAKACjAQEAAwMAAAgAAAAAAAAAAAA/AAAAAAAAAAAA/////x8AAABLVFh3cml0ZXIAQmFz\
@@ -183,12 +183,12 @@ fn what_is_not_supported_is_named() {
     cube[36] = 6;
     assert!(why(&cube).contains("no flat picture"));
     assert!(why(START).contains("its KTX2 header is damaged"));
-    // Codebooks that are not there.
+    // No codebooks.
     assert!(why(&file_with(0, (4, 4), (1, 163), &[0; 64], 0)).contains("Basis data"));
 }
 
 proptest! {
-    // Cases that failed once are run again before any others.
+    // Cases that failed once run first.
     #![proptest_config(ProptestConfig {
         failure_persistence: Some(Box::new(FileFailurePersistence::Direct("tests/ktx-damage.txt"))),
         ..ProptestConfig::default()

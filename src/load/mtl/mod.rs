@@ -1,6 +1,6 @@
 //! MTL files -> the materials, textures and bitmaps that a model uses.
 //!
-//! Own code, because `tobj` stops at `Kd 0.5`, takes two file names for one, and leaves map options to its caller.
+//! Own code, because `tobj` stops at `Kd 0.5`, reads two file names as one, and leaves map options to its caller.
 
 mod meaning;
 mod options;
@@ -24,45 +24,46 @@ use std::path::{Path, PathBuf};
 use textures::{Library, Mapper, Textures};
 use writer::Writer;
 
-/// What a model's surfaces are made of.
+/// Materials of a model, with their textures and bitmaps.
 #[derive(Debug, Default)]
 pub(super) struct Materials {
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
     pub bitmaps: Vec<Bitmap>,
-    /// Index into `materials` for each name asked for.
+    /// Index into `materials` for each requested name.
     pub of_name: Vec<u32>,
-    /// Time that decoding the pictures took.
+    /// Time spent decoding pictures.
     pub decoding: Spent,
 }
 
-/// Everything that reading files needs.
+/// Context of reading a model's material files.
 pub(super) struct Reading<'a> {
-    /// The model.
+    /// Path of the model.
     pub file: &'a Path,
     pub options: &'a LoadOptions,
-    /// Whether vertices have colours: what has no material but those shows them as they are.
+    /// Whether the model has vertex colours: a surface without a material shows them unchanged.
     pub colored: bool,
     pub resolver: &'a mut Resolver,
     pub budget: &'a mut Budget,
     pub warnings: &'a mut Warnings,
 }
 
-/// Reads the files that a model names, in these lines, and makes a material for each name; `None` is what has none.
+/// Reads the material files that a model names, each with its line, and makes a material for each name; `None` stands for
+/// surfaces without one.
 pub(super) type Make = fn(&[(u32, String)], &[Option<&str>], &mut Reading) -> Materials;
 
-/// A library that was read.
+/// A material library as read.
 struct Read {
-    /// For messages.
+    /// Path of the library, for messages.
     file: PathBuf,
-    /// Relative to the model's.
+    /// Folder of the library, relative to the model's.
     folder: PathBuf,
     writer: Writer,
     materials: Vec<Mtl>,
 }
 
-/// Reads what `mtllib` statements (`libraries`, with their lines) name and makes the materials called `names`; `None`
-/// is a run before any `usemtl`.
+/// Reads the files that `mtllib` statements name (`libraries`, with their lines) and makes the materials called `names`; `None`
+/// is a run of faces before any `usemtl`.
 pub(super) fn load(libraries: &[(u32, String)], names: &[Option<&str>], reading: &mut Reading) -> Materials {
     let mut read = read_libraries(libraries, reading);
     if read.is_empty() && names.iter().any(Option::is_some) {
@@ -76,7 +77,7 @@ pub(super) fn load(libraries: &[(u32, String)], names: &[Option<&str>], reading:
     let used: Vec<(usize, usize)> = first_of_each(found.iter().flatten().copied());
     warn_of_redefined(&read, &used, reading.warnings);
 
-    // Pictures of the materials in use, library by library.
+    // Read the pictures of the used materials, library by library.
     let (mut textures, mut missed) = (Textures::default(), 0);
     for (number, library) in read.iter().enumerate() {
         let materials = used.iter().filter(|u| u.0 == number).map(|u| &library.materials[u.1]);
@@ -86,7 +87,7 @@ pub(super) fn load(libraries: &[(u32, String)], names: &[Option<&str>], reading:
         textures.read(&of, materials, reading.options.mtl, &mut finder, limits, reading.warnings);
     }
 
-    // The materials themselves.
+    // Make the materials themselves.
     let invisible = |&(l, m): &(usize, usize)| {
         let (mtl, is_opacity) = (&read[l].materials[m], read[l].writer == Writer::Vtk);
         mtl.d.or(mtl.tr.filter(|_| is_opacity)) == Some(0.0)
@@ -170,7 +171,7 @@ fn read_library(found: Found, line: u32, names: &str, reading: &mut Reading) -> 
     Read { file, folder, writer, materials }
 }
 
-/// The library of the model's own name, for models that use materials but name no library that is there.
+/// Reads the library with the model's own name, for a model that uses materials but whose named libraries are all missing.
 fn library_beside(reading: &mut Reading) -> Option<Read> {
     if reading.options.mtl == MtlMode::Literal {
         return None;
@@ -186,7 +187,7 @@ fn folder_of(file: &Path) -> PathBuf {
     file.parent().map(Path::to_path_buf).unwrap_or_default()
 }
 
-/// Materials by name, as written and without what looks like a comment; the first of a name counts, as the OBJ text
+/// Indexes materials by name, both as written and without a trailing comment; the first of a name wins, as the OBJ specification
 /// says of several libraries.
 fn index(read: &[Read]) -> HashMap<&[u8], (usize, usize)> {
     let mut known: HashMap<&[u8], (usize, usize)> = HashMap::new();
@@ -209,9 +210,9 @@ fn first_of_each<T: Copy + Eq + std::hash::Hash>(items: impl Iterator<Item = T>)
     items.filter(|&item| seen.insert(item)).collect()
 }
 
-/// One warning for all names that no library defines. A `usemtl` without a name asks for no material.
+/// Warns once of all names that no library defines. A `usemtl` without a name asks for no material.
 fn warn_of_undefined(names: &[Option<&str>], found: &[Option<(usize, usize)>], reading: &mut Reading) {
-    /// Names that are listed.
+    /// Most names that are listed.
     const LISTED: usize = 4;
     let lost = names.iter().zip(found).filter(|(_, found)| found.is_none()).filter_map(|(name, _)| *name);
     let lost = first_of_each(lost.filter(|name| !name.is_empty()));
@@ -227,8 +228,8 @@ fn warn_of_undefined(names: &[Option<&str>], found: &[Option<(usize, usize)>], r
     reading.warnings.push(Diagnostic::new("mtl-undefined-material", reading.file, "", text));
 }
 
-/// Warns once for each material in use of whose name there is another that is unlike it: pictures are named relative to their
-/// library.
+/// Warns once for each used material whose name is defined again with other contents. With maps, libraries in different folders
+/// always differ, since pictures are named relative to their library.
 fn warn_of_redefined(read: &[Read], used: &[(usize, usize)], warnings: &mut Warnings) {
     let mut first: HashMap<&str, (&Read, &Mtl)> =
         used.iter().map(|&(l, m)| (&*read[l].materials[m].name, (&read[l], &read[l].materials[m]))).collect();
@@ -242,14 +243,14 @@ fn warn_of_redefined(read: &[Read], used: &[(usize, usize)], warnings: &mut Warn
                 let text = format!("material '{}' is defined again; {place} counts", shorten(&other.name));
                 let warning = Diagnostic::new("mtl-defined-twice", &library.file, other.line.to_string(), text);
                 warnings.push(warning.remedy("give one of them another name"));
-                // Others of the name are not compared: a file may have very many.
+                // One warning per name: a file may have very many duplicates.
                 first.remove(&*other.name);
             }
         }
     }
 }
 
-/// The material of what names none that is known, or has vertices with colours of their own.
+/// Material of surfaces that name no known one; white where the model has vertex colours.
 pub(super) fn plain_material(name: &str, colored: bool) -> Material {
     let mut plain = Material::plain();
     if colored {

@@ -1,10 +1,10 @@
-//! One map statement of an MTL file: its options and the name of its file.
+//! One map statement of an MTL file: its options and its file name.
 
 use crate::load::number;
 use crate::load::text::encoding::decode_name;
 use crate::math::DVec2;
 
-/// Which channel of a picture a scalar map reads (`-imfchan`).
+/// Channel of a picture that a scalar map reads (`-imfchan`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Channel {
     Red,
@@ -18,7 +18,7 @@ pub(super) enum Channel {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Map {
     pub line: u32,
-    /// The file's name as written.
+    /// File name as written.
     pub file: String,
     /// `-imfchan`.
     pub channel: Option<Channel>,
@@ -32,11 +32,11 @@ pub(super) struct Map {
     pub bump: Option<f64>,
     /// `-mm`: base and gain, if they change anything.
     pub base_gain: Option<(f64, f64)>,
-    /// Options that were read and change nothing in our pictures although they should.
+    /// Options that should change the rendering but are not supported.
     pub ignored: Vec<String>,
 }
 
-/// Names of options, and how many numbers or words follow; `-o`, `-s`, `-t` take one to three numbers.
+/// Option names, each with the largest count of numbers or words that follow; `-o`, `-s`, `-t` take one to three numbers.
 const OPTIONS: [(&[u8], usize); 13] = [
     (b"-blendu", 1),
     (b"-blendv", 1),
@@ -53,7 +53,7 @@ const OPTIONS: [(&[u8], usize); 13] = [
     (b"-type", 1),
 ];
 
-/// Reads the rest of a map statement; `None` when it names no file.
+/// Parses the rest of a map statement; `None` when it names no file.
 pub(super) fn parse(rest: &[u8], line: u32) -> Option<Map> {
     let mut map = Map {
         line,
@@ -76,7 +76,7 @@ pub(super) fn parse(rest: &[u8], line: u32) -> Option<Map> {
     (!map.file.is_empty()).then_some(map)
 }
 
-/// Takes options from the front; what is left is the file's name, which may hold spaces, if that follows.
+/// Parses leading options into `map` and returns the rest: the file name, which may hold spaces, if `name_follows`.
 fn take_options<'a>(map: &mut Map, mut rest: &'a [u8], name_follows: bool) -> &'a [u8] {
     while let Some(&(option, most)) = OPTIONS.iter().find(|(o, _)| first_word(rest).eq_ignore_ascii_case(o)) {
         rest = rest[option.len()..].trim_ascii_start();
@@ -85,7 +85,7 @@ fn take_options<'a>(map: &mut Map, mut rest: &'a [u8], name_follows: bool) -> &'
         while values.len() < most {
             let word = first_word(rest);
             let is_value = !word.is_empty() && (!numeric || is_number(word));
-            // The last word is the file, even if it is called 1.5.
+            // The last word is the file name, even if it reads 1.5.
             if !is_value || (name_follows && !values.is_empty() && word.len() == rest.len()) {
                 break;
             }
@@ -104,7 +104,7 @@ fn apply(map: &mut Map, option: &[u8], values: &[&[u8]]) {
     match option {
         b"-s" => map.scale = DVec2::new(or(0, 1.0), or(1, 1.0)),
         b"-o" => map.offset += DVec2::new(or(0, 0.0), or(1, 0.0)),
-        // Turbulence displaces the texture; only its constant part can be drawn.
+        // Turbulence displaces texture coordinates; it is not supported.
         b"-t" if numbers.iter().any(|&n| n != 0.0) => map.ignored.push("-t".into()),
         b"-bm" => map.bump = Some(or(0, 1.0)),
         b"-mm" if (or(0, 0.0), or(1, 1.0)) != (0.0, 1.0) => map.base_gain = Some((or(0, 0.0), or(1, 1.0))),
@@ -120,12 +120,12 @@ fn apply(map: &mut Map, option: &[u8], values: &[&[u8]]) {
                 _ => None,
             }
         }
-        // Blending, sharpening and resolution hints are up to the renderer; types are those of reflection maps.
+        // Blending, sharpening and resolution hints are up to the renderer; types belong to reflection maps.
         _ => {}
     }
 }
 
-/// Where options begin after the name, or its end.
+/// Offset at which options begin after the file name, or the length of `name` if there are none.
 fn late_options(name: &[u8]) -> usize {
     let starts = |at: &usize| {
         let after_space = *at > 0 && name[*at - 1].is_ascii_whitespace();

@@ -1,4 +1,4 @@
-//! MTL text -> materials as written, before anything is made of them.
+//! MTL text -> materials as written, before they are interpreted.
 
 use super::options::{self, Map};
 use crate::load::limits::{Budget, OverBudget};
@@ -12,7 +12,7 @@ use crate::math::primaries::rec_709_of_xyz;
 use std::mem::size_of;
 use std::path::Path;
 
-/// A material as written; `None`: not said.
+/// A material as written; `None`: not given.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Mtl {
     pub name: String,
@@ -30,18 +30,18 @@ pub(super) struct Mtl {
     pub illum: Option<i32>,
     pub pr: Option<f64>,
     pub pm: Option<f64>,
-    /// Sheen, clear coat and its roughness, anisotropy and its rotation (1: once around).
+    /// Sheen `ps`, clear coat `pc` and its roughness `pcr`, anisotropy and its rotation (1: a full turn).
     pub ps: Option<f64>,
     pub pc: Option<f64>,
     pub pcr: Option<f64>,
     pub aniso: Option<f64>,
     pub anisor: Option<f64>,
     pub maps: Vec<(Slot, Map)>,
-    /// Line of its reflection map.
+    /// Line of the reflection map.
     pub refl: Option<u32>,
 }
 
-/// What a map changes.
+/// Property that a map controls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Slot {
     Ambient,
@@ -56,9 +56,9 @@ pub(super) enum Slot {
     Normal,
     Roughness,
     Metallic,
-    /// Occlusion, roughness, metal in red, green, blue.
+    /// Occlusion in red, roughness in green, metallic in blue.
     OcclusionRoughMetal,
-    /// Roughness, metal, occlusion in red, green, blue.
+    /// Roughness in red, metallic in green, occlusion in blue.
     RoughMetalOcclusion,
     Occlusion,
     Sheen,
@@ -104,19 +104,19 @@ const MAPS: [(&[u8], Slot); 32] = [
     (b"map_anisor", Slot::AnisotropyRotation),
 ];
 
-/// What is said of a decal: what it shows where is said by no picture, but by procedures of one program.
+/// Diagnostic for a decal: procedures of one program, not a picture, decide what it shows where.
 const DECAL: (&str, &str) = ("a decal (decal) is not drawn", "paint it into map_Kd");
 
-/// What is said of a reflection map: a picture of surroundings for one material alone, in which nothing of the scene
-/// stands. Here mirrors see the scene, and `--env` is around all of it.
+/// Diagnostic for a reflection map: a picture of the surroundings for one material alone, without the objects of the scene. Here
+/// mirrors reflect the scene, and `--env` surrounds all of it.
 const REFLECTED: (&str, &str) =
     ("a reflection map (refl) is not drawn", "mirrors see the scene; --env puts a picture around it");
 
-/// Statements that change nothing in our pictures.
+/// Statements that do not affect the rendering and cause no warning.
 const SILENT: [&[u8]; 5] = [b"sharpness", b"map_aat", b"km", b"ke_strength", b"interpolatemode"];
 
 impl Mtl {
-    /// Whether both say the same, wherever they say it.
+    /// Returns whether two materials are equal except for line numbers.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         let placeless = |mtl: &Self| {
             let maps = mtl.maps.iter().map(|(slot, map)| (*slot, Map { line: 0, ..map.clone() }));
@@ -125,12 +125,12 @@ impl Mtl {
         placeless(self) == placeless(other)
     }
 
-    /// The last map of a slot.
+    /// Returns the last map of a slot.
     pub(super) fn map(&self, slot: Slot) -> Option<&Map> {
         self.maps.iter().rev().find(|(s, _)| *s == slot).map(|(_, map)| map)
     }
 
-    /// Makes the ambient map the diffuse one where there is no other; its line.
+    /// Turns the ambient map into the diffuse map where there is none; returns its line.
     pub(super) fn take_ambient_map(&mut self) -> Option<u32> {
         if self.map(Slot::Diffuse).is_some() {
             return None;
@@ -140,15 +140,15 @@ impl Mtl {
         Some(map.line)
     }
 
-    /// Whether its specular colour, which reflections are multiplied by, is not black.
+    /// Returns whether the specular colour, which scales reflections, is not black.
     fn is_shiny(&self) -> bool {
         self.ks.is_some_and(|ks| ks.iter().any(|&c| c > 0.0)) || self.map(Slot::Specular).is_some()
     }
 
-    /// Whether any field or map of physically based materials is there. A normal map alone says nothing about
-    /// roughness or metal and does not count.
+    /// Returns whether the material has a field or map of physically based rendering. A normal map says nothing about roughness
+    /// or metal and does not count.
     pub(super) fn is_physical(&self) -> bool {
-        /// Maps of nothing else.
+        /// Maps that only physically based materials have.
         const MAPS: [Slot; 9] = [
             Slot::Roughness,
             Slot::Metallic,
@@ -165,8 +165,8 @@ impl Mtl {
     }
 }
 
-/// Reads all materials of `text`; what cannot be read costs a warning about `file`, and so do materials that would take
-/// more than is left of `budget`, which are left out.
+/// Parses all materials of `text`; unreadable statements cost a warning about `file`, and so do materials that would exceed the
+/// rest of `budget`, which are left out.
 pub(super) fn parse(text: &[u8], file: &Path, budget: &mut Budget, warnings: &mut Warnings) -> Vec<Mtl> {
     let mut parser = Parser { file, line: 1, warnings };
     let mut out: Vec<Mtl> = Vec::new();
@@ -201,11 +201,11 @@ pub(super) fn parse(text: &[u8], file: &Path, budget: &mut Budget, warnings: &mu
     out
 }
 
-/// Bytes that a statement leaves in memory.
+/// Upper bound of the memory that a statement takes, in bytes.
 fn memory(word: &[u8], rest: &[u8]) -> u64 {
-    /// A material in a list that has grown by doubling, with its places in the table of names.
+    /// A material in a list that has grown by doubling, with its entries in the tables of names.
     const MATERIAL: u64 = 2 * size_of::<Mtl>() as u64 + 2 * 96;
-    /// A map, likewise, and its picture's places in tables.
+    /// A map, likewise, with the table entries of its picture.
     const MAP: u64 = 2 * size_of::<(Slot, Map)>() as u64 + 4 * 96;
     let text = 4 * rest.len() as u64;
     if word.eq_ignore_ascii_case(b"newmtl") {
@@ -250,7 +250,7 @@ impl Parser<'_> {
     }
 
     fn map_or_unknown(&mut self, m: &mut Mtl, word: &[u8], rest: &[u8]) {
-        // Exporters write zeros for what a material does not have.
+        // Exporters write zeros for maps that a material does not have.
         let zero = words(rest).next().and_then(|w| number::check(w).word.parse::<f64>().ok()) == Some(0.0);
         if let Some((_, slot)) = MAPS.iter().find(|(name, _)| *name == word) {
             if zero && words(rest).count() == 1 {
@@ -287,7 +287,7 @@ impl Parser<'_> {
         self.warnings.push(warning.remedy(instead));
     }
 
-    /// `r [g b]`, `xyz x [y z]` or `spectral file [factor]`.
+    /// Parses `r [g b]`, `xyz x [y z]` or `spectral file [factor]`.
     fn color(&mut self, rest: &[u8]) -> Option<[f64; 3]> {
         let mut words = words(rest).peekable();
         let kind = words.next_if(|w| matches!(*w, b"spectral" | b"xyz"));
@@ -314,7 +314,7 @@ impl Parser<'_> {
         }
         if kind.is_some() {
             self.warn("mtl-xyz", "a CIE XYZ colour is converted to Rec. 709".into());
-            // What is out of gamut is cut.
+            // Colours out of gamut are clipped.
             return Some(rec_709_of_xyz(color.into()).max(DVec3::ZERO).to_array());
         }
         Some(color)
@@ -334,7 +334,7 @@ impl Parser<'_> {
         value
     }
 
-    /// `factor`, or `-halo factor`, which fades towards the silhouette.
+    /// Parses `factor`, or `-halo factor`, which fades towards the silhouette.
     fn dissolve(&mut self, rest: &[u8]) -> Option<f64> {
         match rest.strip_prefix(b"-halo") {
             Some(rest) => {

@@ -1,6 +1,6 @@
-//! Pictures that maps name -> bitmaps of the scene, and those made from them: one channel, two in one, opaque.
+//! Pictures that maps name -> bitmaps of the scene: unchanged, or derived as one channel, two pictures merged, or made opaque.
 //!
-//! Our materials read fixed channels (opacity and shininess red, roughness green, metal blue, …); MTL names a picture, and
+//! Our materials read fixed channels (opacity and shininess red, roughness green, metallic blue, …); MTL names a picture, and
 //! perhaps a channel, for each.
 
 use super::options::Channel;
@@ -10,38 +10,38 @@ use crate::scene::color::to_srgb;
 use crate::scene::{Bitmap, Pixels};
 use std::collections::HashMap;
 
-/// What is taken from a picture; numbers are indices into [`Pictures::sources`].
+/// A bitmap to derive from decoded pictures; picture numbers are indices into [`Pictures::sources`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Take {
-    /// All of it.
+    /// The picture unchanged.
     Whole(usize),
-    /// Its colour; alpha 1.
+    /// The picture's colour; alpha 1.
     Opaque(usize),
-    /// One channel in all of red, green, blue; alpha 1.
+    /// One channel copied to red, green and blue; alpha 1.
     Channel(usize, Channel),
-    /// 1 − one channel.
+    /// 1 − one channel, copied to red, green and blue; alpha 1.
     Inverse(usize, Channel),
-    /// Roughness in green, metal in blue, 1 where there is none.
+    /// Roughness in green, metallic in blue; 1 for a missing source.
     RoughMetal(Option<(usize, Channel)>, Option<(usize, Channel)>),
-    /// One channel coded as sRGB in red, green, blue: a number where a colour is read.
+    /// One channel, sRGB-encoded, in red, green and blue: a linear number where a colour is read.
     Coded(usize, Channel),
-    /// Strength of a grain in blue, and in red and green its direction, by how often it is turned: a channel times the
-    /// number whose bits these are. 1 and not at all where there is none.
+    /// Anisotropy: strength in blue, direction as a vector in red and green. The angle in turns is a channel times the `f64`
+    /// with these bits. Without sources the strength is 1 and the angle 0.
     Anisotropy(Option<(usize, Channel)>, Option<(usize, Channel)>, u64),
 }
 
-/// How a picture uses its alpha channel.
+/// Use that a picture makes of its alpha channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Alpha {
     /// 1 everywhere.
     Solid,
-    /// 0 everywhere: a channel nobody looked at.
+    /// 0 everywhere: a channel that its author ignored.
     Clear,
-    /// Something in between.
+    /// Values in between, or both 0 and 1.
     Used,
 }
 
-/// Decoded pictures and the bitmaps made of them.
+/// Decoded pictures and the bitmaps derived from them.
 #[derive(Debug, Default)]
 pub(super) struct Pictures {
     sources: Vec<Bitmap>,
@@ -49,7 +49,7 @@ pub(super) struct Pictures {
     made: Vec<Made>,
 }
 
-/// A bitmap for the scene: a picture as it is, which is not copied, or one made of pictures.
+/// A bitmap of the scene: a decoded picture, which is not copied, or a new one.
 #[derive(Debug)]
 enum Made {
     Source(usize),
@@ -57,16 +57,16 @@ enum Made {
 }
 
 impl Pictures {
-    /// Adds a decoded picture; its number.
+    /// Adds a decoded picture and returns its index.
     pub(super) fn add(&mut self, bitmap: Bitmap) -> usize {
         self.sources.push(bitmap);
         self.sources.len() - 1
     }
 
-    /// Index into [`Self::finish`]'s bitmaps of what is taken; made when first asked for.
+    /// Returns the index of a bitmap in the list of [`Self::finish`]; derives it on first use.
     ///
     /// # Errors
-    /// When it would be larger than `limits` allow, or than what is left of `budget`.
+    /// If the bitmap exceeds `limits` or the rest of `budget`.
     pub(super) fn take(&mut self, take: Take, limits: &Limits, budget: &mut Budget) -> Result<u32, Unusable> {
         if let Some(&known) = self.known.get(&take) {
             return Ok(known);
@@ -90,7 +90,7 @@ impl Pictures {
         Ok(index)
     }
 
-    /// Width and height of what has to be made, and bytes of a texel; `None`: it is there.
+    /// Width and height of the bitmap to derive, and bytes per texel; `None` if nothing has to be allocated.
     fn size(&self, take: Take) -> Option<((u32, u32), u64)> {
         let size = |i: usize| (self.sources[i].width, self.sources[i].height);
         match take {
@@ -105,7 +105,7 @@ impl Pictures {
         }
     }
 
-    /// Names of the pictures that something is made of, for messages.
+    /// Names of the source pictures, for messages.
     pub(super) fn name(&self, take: Take) -> String {
         match take {
             Take::Whole(i) | Take::Opaque(i) | Take::Channel(i, _) | Take::Inverse(i, _) | Take::Coded(i, _) => {
@@ -115,7 +115,7 @@ impl Pictures {
         }
     }
 
-    /// The bitmaps that were taken.
+    /// Returns the bitmaps in the order of their indices.
     pub(super) fn finish(mut self) -> Vec<Bitmap> {
         let bitmap = |made| match made {
             Made::Source(i) => std::mem::take(&mut self.sources[i]),
@@ -124,7 +124,7 @@ impl Pictures {
         self.made.into_iter().map(bitmap).collect()
     }
 
-    /// How picture i uses its alpha channel.
+    /// Returns how picture `i` uses its alpha channel.
     pub(super) fn alpha(&self, i: usize) -> Alpha {
         let (mut lowest, mut highest) = (1.0f32, 0.0f32);
         each(&self.sources[i], |p| (lowest, highest) = (lowest.min(p[3]), highest.max(p[3])));
@@ -137,17 +137,17 @@ impl Pictures {
         }
     }
 
-    /// Whether red, green and blue are equal everywhere.
+    /// Returns whether red, green and blue are equal in every texel.
     pub(super) fn is_grey(&self, i: usize) -> bool {
         let mut grey = true;
         each(&self.sources[i], |p| grey &= p[0] == p[1] && p[1] == p[2]);
         grey
     }
 
-    /// Whether nine in ten texels are unit vectors that point out of the surface: a normal map. Light grey is one, too, but that
-    /// is a height.
+    /// Returns whether picture `i` is a normal map: nine in ten texels are unit vectors that point out of the surface. Light
+    /// grey decodes to a unit vector, too, but is a height.
     pub(super) fn is_normal_map(&self, i: usize) -> bool {
-        /// How far the colours of grey lie apart that was compressed.
+        /// Spread of the channels that compression leaves in grey.
         const GREY: f32 = 0.05;
         let (mut unit, mut all) = (0u64, 0u64);
         each(&self.sources[i], |[r, g, b, _]| {
@@ -169,7 +169,7 @@ impl Pictures {
         Bitmap { name: name.clone(), width: *width, height: *height, pixels }
     }
 
-    /// In sixteen bits, so that coding loses nothing.
+    /// Uses 16 bits so that the sRGB encoding loses nothing.
     fn coded(&self, i: usize, channel: Channel) -> Bitmap {
         let Bitmap { name, width, height, .. } = &self.sources[i];
         let mut pixels = Vec::with_capacity(*width as usize * *height as usize);
@@ -182,7 +182,7 @@ impl Pictures {
         self.pair([rough, metal], texel, |texels| Pixels::Rgba8(texels.into()))
     }
 
-    /// In sixteen bits, so that a grain that is not turned is not turned.
+    /// Uses 16 bits so that an angle of 0 stays exact.
     fn anisotropy(&self, strength: Option<(usize, Channel)>, turn: Option<(usize, Channel)>, most: f64) -> Bitmap {
         #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
         let texel = |[strength, turn]: [Option<f32>; 2]| {
@@ -192,9 +192,9 @@ impl Pictures {
         self.pair([strength, turn], texel, |texels| Pixels::Rgba16(texels.into()))
     }
 
-    /// A bitmap made of the values of two pictures at each texel.
+    /// Combines two pictures texel by texel.
     ///
-    /// The smaller picture is repeated texel by texel to the larger one's size.
+    /// The result has the larger width and the larger height; smaller pictures are enlarged by repeating texels.
     fn pair<T>(
         &self,
         [first, second]: [Option<(usize, Channel)>; 2],
@@ -245,7 +245,7 @@ fn each(bitmap: &Bitmap, mut look: impl FnMut([f32; 4])) {
     }
 }
 
-/// Texels without alpha.
+/// Views the bytes of an RGB picture as texels.
 fn threes(bytes: &[u8]) -> &[[u8; 3]] {
     bytes.as_chunks().0
 }
@@ -256,7 +256,7 @@ fn pick([r, g, b, a]: [f32; 4], channel: Channel) -> f32 {
         Channel::Green => g,
         Channel::Blue => b,
         Channel::Alpha => a,
-        // Rec. 709 weights on the values as stored: scalar maps are data, not light.
+        // Rec. 709 weights on the stored values: scalar maps are data, not light.
         Channel::Luminance => 0.2126 * r + 0.7152 * g + 0.0722 * b,
     }
 }
@@ -307,7 +307,7 @@ mod tests {
         pictures.finish().into_iter().map(texels).collect()
     }
 
-    /// Takes something with the usual limits.
+    /// Derives a bitmap under the default limits.
     fn make(pictures: &mut Pictures, take: Take) -> u32 {
         let limits = Limits::default();
         pictures.take(take, &limits, &mut Budget::new(&limits)).ok().unwrap()
@@ -362,7 +362,7 @@ mod tests {
 
     #[test]
     fn what_is_made_is_charged_before_it_is_made() {
-        // A row and a column, of which a pair is as wide as the one and as high as the other.
+        // A row and a column: the pair has the width of the one and the height of the other.
         let mut p = pictures(&[(3000, 1, &[[1; 4]; 3000]), (1, 3000, &[[2; 4]; 3000])]);
         let (row, column) = (Some((0, Channel::Red)), Some((1, Channel::Red)));
         let pair = 3000 * 3000 * 4 + 3_000_000 * 8;
@@ -380,7 +380,7 @@ mod tests {
         ] {
             assert!(p.take(take, &Limits::default(), &mut budget).is_err(), "{take:?}");
         }
-        // What is there already costs nothing.
+        // Bitmaps that exist already cost nothing.
         assert!(p.take(Take::Whole(0), &Limits::default(), &mut budget).is_ok());
         assert!(p.take(Take::RoughMetal(row, column), &Limits::default(), &mut budget).is_ok());
     }

@@ -282,7 +282,7 @@ fn a_picture_of_many_names_is_read_and_charged_once() {
     png(&dir.path().join("a.png"), [1, 2, 3, 255]);
     let names = (0..60).map(|i| format!("newmtl m{i}\nKd 1 1 1\nmap_Kd {}a.png\n", "sub/../".repeat(i)));
     fs::write(dir.path().join("m.mtl"), names.collect::<String>()).unwrap();
-    // Beside the picture there are bytes that no decoder looks at.
+    // Padding after the picture that decoders ignore.
     let mut bytes = fs::read(dir.path().join("a.png")).unwrap();
     bytes.resize(1_000_000, 0);
     fs::write(dir.path().join("a.png"), bytes).unwrap();

@@ -16,66 +16,66 @@ use crate::stopwatch::Spent;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Height of a bump map's white over its black, in sides of the picture, where `-bm` is 1 or not given.
+/// Height from black to white in a bump map, in sides of the picture, where `-bm` is 1 or not given.
 ///
-/// The MTL text gives no unit. A whole side would make cliffs of every map; 1/64 is the relief of rough plaster on a
+/// The MTL specification gives no unit. A whole side would turn every map into cliffs; 1/64 is the relief of rough plaster on a
 /// square metre.
 const BUMP_HEIGHT: f64 = 1.0 / 64.0;
 
-/// All pictures that materials use, and the textures made of them.
+/// All pictures that materials use, and the textures made from them.
 #[derive(Debug, Default)]
 pub(super) struct Textures {
-    /// (Library, name as written) -> the picture's number, if it could be read.
+    /// (Library, name as written) -> index of the picture, or `None` if it could not be read.
     known: HashMap<(usize, String), Option<usize>>,
-    /// Canonical path of a file -> its picture, if it could be read: one file may have many names.
+    /// Canonical path of a file -> index of its picture, or `None` if it could not be read: one file may have many names.
     files: HashMap<PathBuf, Option<usize>>,
     pictures: Pictures,
     textures: Vec<Texture>,
-    /// Time that decoding took.
+    /// Time spent decoding.
     pub(super) decoding: Spent,
 }
 
-/// Pictures to decode, and the canonical path of each.
+/// Pictures to decode, with their canonical paths.
 #[derive(Default)]
 struct Queue {
     images: Vec<Encoded<'static>>,
     files: Vec<PathBuf>,
 }
 
-/// A library whose materials are used.
+/// A library with materials in use.
 pub(super) struct Library<'a> {
-    /// Which one.
+    /// Index of the library.
     pub number: usize,
-    /// Its path for messages.
+    /// Path of the library, for messages.
     pub file: &'a Path,
-    /// Its folder, relative to the model's.
+    /// Folder of the library, relative to the model's.
     pub folder: &'a Path,
 }
 
-/// The name of a file without what looks like a comment behind it; files whose name holds that come first.
+/// Cuts a trailing comment off a file name; callers try the full name first, as a file name may contain ` #`.
 fn without_remark(name: &str) -> Option<&str> {
     let starts = |pair: &[u8]| pair[0].is_ascii_whitespace() && pair[1] == b'#';
     let name = name.get(..name.as_bytes().windows(2).position(starts)?)?.trim_end();
     (!name.is_empty()).then_some(name)
 }
 
-/// The ends of a name that begins with what looks like options of another program, `-colorspace sRGB a.png`: without the first
+/// Suffixes of a name that begins with what looks like options of another program, `-colorspace sRGB a.png`: without the first
 /// word, without two, and so on.
 fn without_options(name: &str) -> impl Iterator<Item = &str> {
-    /// Words that are left out at most.
+    /// Most words that are left out.
     const MOST: usize = 4;
     let begin = |at: usize| name.as_bytes()[at].is_ascii_whitespace();
     let spaces = (0..name.len()).filter(move |&at| name.starts_with('-') && begin(at));
     spaces.map(|at| name[at..].trim_start()).filter(|rest| !rest.is_empty()).take(MOST)
 }
 
-/// Maps that are drawn. Ambient light sees the diffuse map unless the text counts.
+/// Returns whether maps of a slot are drawn. Ambient light uses the diffuse map, except under [`MtlMode::Literal`].
 fn is_drawn(slot: Slot, mode: MtlMode) -> bool {
     slot != Slot::Ambient || mode == MtlMode::Literal
 }
 
 impl Textures {
-    /// Reads and decodes every picture that `materials` of one library name.
+    /// Reads and decodes the pictures that `materials` of one library name.
     pub(super) fn read<'m>(
         &mut self,
         library: &Library,
@@ -116,10 +116,10 @@ impl Textures {
         }
     }
 
-    /// Finds the picture of a map, and reads it unless it was read before.
+    /// Finds the picture of a map, and reads its file unless that was done before.
     ///
     /// # Errors
-    /// The warning that it is not there, or cannot be read.
+    /// A warning that the file is missing or cannot be read.
     fn queue(
         &mut self,
         map: &Map,
@@ -153,17 +153,17 @@ impl Textures {
         Ok(found)
     }
 
-    /// The picture of a slot, if it could be read.
+    /// Index of the picture of a slot; `None` if there is none or it could not be read.
     pub(super) fn picture(&self, library: usize, mtl: &Mtl, slot: Slot) -> Option<usize> {
         self.known.get(&(library, mtl.map(slot)?.file.clone())).copied().flatten()
     }
 
-    /// Textures and bitmaps for the scene.
+    /// Returns the textures and bitmaps of the scene.
     pub(super) fn finish(self) -> (Vec<Texture>, Vec<Bitmap>) {
         (self.textures, self.pictures.finish())
     }
 
-    /// A texture that shows `take` as the options of `map` say.
+    /// Makes a texture of `take`, transformed and wrapped by the options of `map`.
     fn texture(
         &mut self,
         take: Take,
@@ -191,7 +191,7 @@ impl Textures {
     }
 }
 
-/// Gives one material its maps.
+/// Assigns the maps of one material.
 pub(super) struct Mapper<'a> {
     pub textures: &'a mut Textures,
     pub library: &'a Library<'a>,
@@ -239,7 +239,7 @@ impl Mapper<'_> {
         Some((map, self.textures.picture(self.library.number, self.mtl, slot)?))
     }
 
-    /// A texture that shows `take` as the options of `map` say; `None`, with a warning, where it takes too much memory.
+    /// Makes a texture of `take` by the options of `map`; `None`, with a warning, if it takes too much memory.
     fn texture(&mut self, take: Take, map: &Map) -> Option<TextureRef> {
         let made = self.textures.texture(take, map, (self.limits, self.budget));
         let warn = |why: Unusable| {
@@ -256,7 +256,7 @@ impl Mapper<'_> {
         self.texture(Take::Whole(picture), &map)
     }
 
-    /// A map of one number: the channel asked for, or the brightness.
+    /// Texture of a scalar map: the requested channel, or the luminance.
     fn scalar(&mut self, slot: Slot) -> Option<TextureRef> {
         let (map, picture) = self.picture(slot)?;
         let map = map.clone();
@@ -275,7 +275,7 @@ impl Mapper<'_> {
         }
     }
 
-    /// The diffuse map, and what says where the surface is: its alpha channel, or a map of its own.
+    /// Assigns the diffuse map and the opacity, which comes from a map of its own or from the diffuse map's alpha channel.
     fn opacity(&mut self, material: &mut Material) {
         let diffuse = self.picture(Slot::Diffuse).map(|(map, picture)| (map.clone(), picture));
         let alpha = diffuse.as_ref().map_or(Alpha::Solid, |(_, picture)| self.textures.pictures.alpha(*picture));
@@ -302,7 +302,7 @@ impl Mapper<'_> {
         }
     }
 
-    /// What `map_d` or `map_Tr` show, or whether it is the alpha channel of the diffuse map.
+    /// Opacity from `map_d` or `map_Tr`; the flag says that it is the diffuse map's alpha channel instead.
     fn dissolve(&mut self, diffuse: Option<usize>) -> (Option<(Take, Map)>, bool) {
         if let Some((map, picture)) = self.picture(Slot::Dissolve) {
             let map = map.clone();
@@ -328,7 +328,7 @@ impl Mapper<'_> {
         (Some((Take::Inverse(picture, map.channel.unwrap_or(Channel::Luminance)), map)), false)
     }
 
-    /// Normal and bump maps. Many programs write normal maps as bump maps; their texels tell.
+    /// Assigns the normal map and the bump map. Many programs write normal maps as bump maps; their texels give them away.
     fn relief(&mut self, material: &mut Material) {
         #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
         let strength = |map: &Map| map.bump.unwrap_or(1.0) as f32;
@@ -337,7 +337,7 @@ impl Mapper<'_> {
             material.normal_scale = strength(&map);
             material.normal_map = self.texture(Take::Whole(picture), &map);
         }
-        // Faces stay where the file has them: what is proven of hits is proven of those.
+        // Displacement is drawn as bumps: faces keep their positions, on which the proofs about hits rest.
         let displaced = self.picture(Slot::Bump).is_none();
         let slot = if displaced { Slot::Displacement } else { Slot::Bump };
         let Some((map, picture)) = self.picture(slot) else { return };
@@ -366,7 +366,7 @@ impl Mapper<'_> {
         material.bump_map = self.texture(take, &map);
     }
 
-    /// Maps of sheen, clear coat and grain.
+    /// Assigns the maps of sheen, clear coat and anisotropy.
     fn lobes(&mut self, m: &mut MetalRough) {
         if let Some(sheen) = &mut m.sheen {
             let named = self.picture(Slot::Sheen).map(|(map, picture)| (map.clone(), picture));
@@ -384,7 +384,8 @@ impl Mapper<'_> {
         }
     }
 
-    /// Strength and direction of a grain in one texture; both go by the options of the first there is.
+    /// Texture of anisotropic strength and direction; the options of the strength's map apply to both, or else those of the
+    /// direction's.
     fn anisotropy(&mut self) -> Option<TextureRef> {
         let channel = |(map, picture): (&Map, usize)| (picture, map.channel.unwrap_or(Channel::Luminance));
         let (strength, turn) = (self.picture(Slot::Anisotropy), self.picture(Slot::AnisotropyRotation));
@@ -394,7 +395,7 @@ impl Mapper<'_> {
         self.texture(take, &map)
     }
 
-    /// A map of occlusion, or that in a map that has it in blue.
+    /// Texture of occlusion, from a map of its own or the blue channel of a packed map.
     fn occlusion(&mut self) -> Option<TextureRef> {
         if self.picture(Slot::Occlusion).is_some() {
             return self.scalar(Slot::Occlusion);
@@ -404,7 +405,7 @@ impl Mapper<'_> {
         self.texture(Take::Channel(picture, Channel::Blue), &map)
     }
 
-    /// Tells of an ambient map that is another than the diffuse one.
+    /// Warns of an ambient map that differs from the diffuse one.
     fn tell_of_ambient_map(&mut self) {
         let file = |slot: Slot| self.mtl.map(slot).map(|map| &map.file);
         if self.mode == MtlMode::Guess
@@ -414,7 +415,7 @@ impl Mapper<'_> {
         }
     }
 
-    /// Roughness and metal in one texture; both go by the options of the first there is.
+    /// Texture of roughness and metallic; the options of the roughness map apply to both, or else those of the metallic map.
     fn rough_metal(&mut self) -> Option<TextureRef> {
         if let Some((map, picture)) = self.picture(Slot::RoughMetalOcclusion) {
             let map = map.clone();

@@ -1,21 +1,21 @@
-//! Programs that write MTL files, known by their comments, and what each writes without meaning it.
+//! Programs that write MTL files, recognised by their comments, and the habits of each.
 
 use super::parse::Mtl;
 use crate::load::text::encoding::to_ascii_superset;
 use crate::math::Vec3;
 use crate::scene::color::from_srgb;
 
-/// Who wrote a file.
+/// Program that wrote a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Writer {
-    /// One that is not known, or of which nothing is.
+    /// Unknown, or without known habits.
     #[default]
     Other,
-    /// Writes 0.8 or what was set before as `Kd` under a map that takes its place; `illum` 3 for metals, with how metallic as
-    /// `Ka` and 1000 (1 − roughness)² as `Ns`; 6 and 9 for metals and others whose alpha, `d`, is below 1; `Tf` beside fields of
-    /// physically based materials for the share that light passes with, if any does; colours in linear light.
+    /// Blender. Under a map that replaces it, `Kd` is 0.8 or a former value. `illum` 3 is a metal, with the metallic factor in
+    /// `Ka` and 1000 (1 − roughness)² in `Ns`; 6 and 9 are metals and others with an alpha, `d`, below 1. `Tf` beside physically
+    /// based fields is the transmission, where there is any. Colours are linear.
     Blender,
-    /// 3ds Max: writes the colour that a map takes the place of.
+    /// 3ds Max: writes the colour that a map replaces.
     Max,
     /// AliceVision's Meshroom: writes 0.6 as `Kd` under its maps.
     Meshroom,
@@ -23,7 +23,7 @@ pub(super) enum Writer {
     Vtk,
 }
 
-/// What comments of each say, in lower case.
+/// Text in the comments of each program, in lower case.
 const NAMES: [(&str, Writer); 5] = [
     ("# blender ", Writer::Blender),
     ("# 3ds max ", Writer::Max),
@@ -33,9 +33,9 @@ const NAMES: [(&str, Writer); 5] = [
 ];
 
 impl Writer {
-    /// Who wrote a text, by the comments that it begins with.
+    /// Recognises the writer of a text by its leading comments.
     pub(super) fn of(text: &[u8]) -> Self {
-        /// Lines that are looked at.
+        /// Most lines that are searched.
         const LINES: usize = 32;
         let text = to_ascii_superset(text);
         let lines = text.split(|&byte| matches!(byte, b'\n' | b'\r')).map(<[u8]>::trim_ascii).take(LINES);
@@ -47,17 +47,17 @@ impl Writer {
         comments.find_map(known).unwrap_or_default()
     }
 
-    /// Whether a map takes the place of `Kd`, which is written all the same.
+    /// Returns whether a map replaces `Kd`, which is written nevertheless.
     pub(super) fn replaces_by_maps(self) -> bool {
         matches!(self, Self::Blender | Self::Max | Self::Meshroom)
     }
 }
 
-/// Whether the diffuse colours are numbers of eight bits as screens show them (89 of 255 is `0.349020`): picked, and written
-/// as they were picked. They are if all of them are such numbers, to the last digit, and so many digits say so that it
-/// would be chance in one of a hundred files.
+/// Returns whether the diffuse colours are 8-bit sRGB codes (89 of 255 is `0.349020`), picked on a screen and written
+/// unconverted. They are if every component is such a code, to the last digit, and together they have so many digits that chance
+/// would produce them in less than one of a hundred files.
 pub(super) fn are_codes(materials: &[Mtl]) -> bool {
-    /// How likely chance may be.
+    /// Largest probability of chance that still counts as codes.
     const CHANCE: f64 = 1e-2;
     let mut all: Vec<f64> = materials.iter().filter_map(|mtl| mtl.kd).flatten().collect();
     all.sort_unstable_by(f64::total_cmp);
@@ -66,28 +66,28 @@ pub(super) fn are_codes(materials: &[Mtl]) -> bool {
     chance.is_some_and(|chance| chance < CHANCE)
 }
 
-/// How likely it is that a number with so many digits is one of eight bits by chance; `None` where it is none. What is next to
-/// 0 or 1, or a third, is what people write.
+/// Probability that a number with this many digits is an 8-bit code by chance; `None` if it is not one. Codes of 0, 1 and thirds
+/// prove nothing, as people write them, too.
 fn chance_of_code(number: f64) -> Option<f64> {
     const CODES: f64 = 255.0;
-    /// Of eight bits.
+    /// Codes of 0, 1/3, 2/3 and 1.
     const COMMON: [f64; 4] = [0.0, 85.0, 170.0, 255.0];
-    // Zeros at the end were not kept, so that some numbers seem to have a digit less, and say less.
+    // Trailing zeros are lost, so some numbers seem to have a digit less, which only weakens the evidence.
     let written = number.to_string();
     let digits = written.split_once('.').map_or(0, |(_, places)| places.len());
     let half = 0.5 * libm::exp10(-(digits as f64));
     let code = (number * CODES).round();
-    // Some cut the digits that they do not write.
+    // Tolerates writers that truncate instead of rounding.
     let is_code = (0.0..=1.0).contains(&number) && (number - code / CODES).abs() <= 2.0 * half;
     is_code.then_some(if COMMON.contains(&code) { 1.0 } else { (4.0 * half * CODES).min(1.0) })
 }
 
-/// Whether each part of a colour is one of eight bits.
+/// Returns whether each component of a colour is an 8-bit code.
 pub(super) fn is_code(color: [f64; 3]) -> bool {
     color.into_iter().all(|part| chance_of_code(part).is_some())
 }
 
-/// The light of a colour of screens, each part 0…1.
+/// Decodes an sRGB colour, each component 0…1, to linear light.
 pub(super) fn light(code: [f64; 3]) -> [f64; 3] {
     #[expect(clippy::cast_possible_truncation, reason = "colours become f32")]
     let linear: Vec3 = from_srgb(code.map(|part| part as f32));
@@ -115,11 +115,11 @@ mod tests {
             let of = |&kd: &[f64; 3]| Mtl { kd: Some(kd), ..Mtl::default() };
             are_codes(&colors.iter().map(of).collect::<Vec<_>>())
         };
-        // 3ds Max, SketchUp and Tinkercad.
+        // Written by 3ds Max, SketchUp and Tinkercad.
         assert!(are(&[[0.1098, 0.3490, 0.6941]]));
         assert!(are(&[[0.400000, 0.298039, 0.000000], [1.0, 1.0, 1.0]]));
         assert!(are(&[[0.27450980392156865, 0.7176470588235294, 0.28627450980392155]]));
-        // By hand, by halves, of Blender, and one that is none among others.
+        // Written by hand, in halves, by Blender, and with one component that is no code.
         assert!(!are(&[[0.8, 0.2, 0.4], [0.6, 0.6, 0.6], [0.1, 0.9, 0.0]]));
         assert!(!are(&[[0.5, 0.25, 0.125]]));
         assert!(!are(&[[0.8, 0.026241, 0.115]]));

@@ -1,20 +1,20 @@
-//! How a value runs from key to key (glTF 2.0, appendix C), in `f64`.
+//! Interpolation of a value between keyframes (glTF 2.0, appendix C), in `f64`.
 
 use crate::math::DQuat;
 
-/// The shape of a curve between its keys.
+/// Interpolation between keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Interpolation {
-    /// The value of the key before.
+    /// The value of the previous key.
     Step,
-    /// Straight lines; rotations along the shorter arc.
+    /// Linear; rotations along the shorter arc.
     Linear,
-    /// Cubic Hermite splines: every key has a tangent before its value and one behind it.
+    /// Cubic Hermite splines: every key has an in-tangent before its value and an out-tangent after it.
     CubicSpline,
 }
 
 impl Interpolation {
-    /// By its name; an unknown one, which the schema check has told of, is the default.
+    /// Returns the interpolation of this name; linear, the default, for unknown names, which the schema check reports.
     pub(super) fn of(name: Option<&str>) -> Self {
         match name {
             Some("STEP") => Self::Step,
@@ -23,35 +23,35 @@ impl Interpolation {
         }
     }
 
-    /// Elements that each key has in the output: tangents count.
+    /// Output elements per key, tangents included.
     pub(super) fn elements(self) -> usize {
         if self == Self::CubicSpline { 3 } else { 1 }
     }
 }
 
-/// Where a moment lies among keys.
+/// Position of a time among keys.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Between {
-    /// The key before.
+    /// Index of the key before.
     pub(super) before: usize,
-    /// The key behind; the same one at and outside the ends.
+    /// Index of the key after; equal to `before` at and beyond the ends.
     pub(super) after: usize,
-    /// Seconds from one to the other.
+    /// Seconds between both keys.
     span: f64,
-    /// How far along, from 0 to below 1.
+    /// Fraction of the span that has passed, from 0 to below 1.
     part: f64,
 }
 
 impl Between {
-    /// Finds `time` among ascending times, of which there is at least one. Outside them the nearest key counts, and of
-    /// two at one time the later.
+    /// Locates `time` among at least one ascending time. Beyond the ends the nearest key counts, and of two keys at one time the
+    /// later.
     ///
-    /// Times are stored as `f32`: a moment that is a key's when rounded has reached it, or every other frame of a
-    /// sequence would show the key before.
+    /// Times are stored as `f32`: a moment that rounds to the time of a key has reached that key; otherwise every other frame of
+    /// a sequence would show the previous one.
     pub(super) fn of(times: &[f32], time: f64) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "compared as stored")]
         let stored = time as f32;
-        // The first key behind the moment.
+        // Index of the first key after the moment.
         let after = times.partition_point(|&t| t <= stored);
         let at = |key: usize| times.get(key).copied().map_or(0.0, f64::from);
         match after.checked_sub(1) {
@@ -59,7 +59,7 @@ impl Between {
             Some(before) if after == times.len() => Self::at_key(before),
             Some(before) => {
                 let span = at(after) - at(before);
-                // A key that rounding has reached may lie a little behind the moment.
+                // A key that was reached by rounding may lie slightly after the moment.
                 Self { before, after, span, part: ((time - at(before)) / span).max(0.0) }
             }
         }
@@ -70,7 +70,7 @@ impl Between {
     }
 }
 
-/// A key's value; the tangents are empty where the interpolation needs none.
+/// Value of a key; the tangents are empty where the interpolation needs none.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Key {
     pub(super) tangent_in: Vec<f64>,
@@ -78,7 +78,7 @@ pub(super) struct Key {
     pub(super) tangent_out: Vec<f64>,
 }
 
-/// The value of numbers that have nothing to do with each other: translations, scales, weights.
+/// Interpolates independent numbers: translations, scales, weights.
 pub(super) fn numbers(interpolation: Interpolation, between: Between, before: &Key, after: &Key) -> Vec<f64> {
     let part = between.part;
     let pairs = before.value.iter().zip(&after.value);
@@ -94,13 +94,14 @@ pub(super) fn numbers(interpolation: Interpolation, between: Between, before: &K
     }
 }
 
-/// What the value before, its tangent, the value behind and its tangent weigh at `part` of `span` seconds.
+/// Hermite weights of the value before, its out-tangent, the value after and its in-tangent, at fraction `part` of `span`
+/// seconds.
 fn hermite(part: f64, span: f64) -> [f64; 4] {
     let (t, t2, t3) = (part, part * part, part * part * part);
     [2.0 * t3 - 3.0 * t2 + 1.0, span * (t3 - 2.0 * t2 + t), 3.0 * t2 - 2.0 * t3, span * (t3 - t2)]
 }
 
-/// A unit quaternion; `None` where the numbers give no direction.
+/// Interpolates a rotation to a unit quaternion; `None` where it has length 0 or is not finite.
 pub(super) fn rotation(interpolation: Interpolation, between: Between, before: &Key, after: &Key) -> Option<DQuat> {
     if interpolation == Interpolation::Linear && between.part > 0.0 {
         return Some(slerp(unit(&before.value)?, unit(&after.value)?, between.part));
@@ -114,13 +115,13 @@ fn unit(q: &[f64]) -> Option<DQuat> {
     (length > 0.0 && length.is_finite()).then(|| q / length)
 }
 
-/// From `a` to `b` along the shorter arc of the sphere.
+/// Interpolates from `a` to `b` along the shorter arc of the sphere.
 ///
 /// Angles come from `libm`, so that every machine draws the same picture.
 fn slerp(a: DQuat, b: DQuat, part: f64) -> DQuat {
-    /// Cosine above which an arc cannot be told from its chord: they differ by the cube of the angle, below 1e-10.
+    /// Cosine above which the arc is replaced by its chord: they differ by the cube of the angle, below 1e-10.
     const STRAIGHT: f64 = 1.0 - 1e-7;
-    // A quaternion and its negative are one rotation; the nearer of both makes the arc short.
+    // A quaternion and its negative are the same rotation; the nearer of the two gives the shorter arc.
     let dot = a.dot(b);
     let (b, cosine) = if dot < 0.0 { (-b, -dot) } else { (b, dot) };
     if cosine > STRAIGHT {
@@ -201,7 +202,7 @@ mod tests {
         };
         let turned = |a: &Key, b: &Key| rotation(Interpolation::Linear, third, a, b).unwrap();
         close(turned(&around_z(0.0), &around_z(0.9 * PI)), 0.3 * PI);
-        // 1.5 turns of a half are half a turn backwards.
+        // A rotation by 1.5 π is shorter as one by −0.5 π.
         close(turned(&around_z(0.0), &around_z(1.5 * PI)), -0.5 * PI / 3.0);
         close(turned(&around_z(0.2), &around_z(0.2 + 3e-5)), 0.2 + 1e-5);
     }

@@ -1,8 +1,8 @@
-//! Animations: which there are ([`Animation`]), what pointers aim at ([`pointer`]), how a value runs between keys ([`curve`]),
-//! what a moment of one does to nodes and numbers ([`play`]), and the document at that moment ([`posed`]).
+//! Animations: their list ([`Animation`]), the targets of pointers ([`pointer`]), interpolation between keys ([`curve`]),
+//! evaluation at a moment ([`play`]), and the document at that moment ([`posed`]).
 //!
-//! Only the moment that is asked for is read: all times of a sampler, and of its values those of the keys around it.
-//! Faults are warnings, each costs one channel: a picture can be drawn without.
+//! Only the requested moment is read: all times of a sampler, but only the values of the keys around it. Faults are warnings,
+//! and each costs one channel: the scene can be drawn without it.
 
 mod curve;
 mod play;
@@ -22,15 +22,15 @@ use gltf::json::accessor::{Accessor, ComponentType};
 use pointer::{Entry, Form, Pointed};
 use std::collections::HashMap;
 
-/// An animation of the file, as its JSON says.
+/// An animation as declared in the JSON.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Animation {
     pub(super) name: Option<String>,
-    /// `None`: a channel whose parts are not there, which the schema check has told of.
+    /// `None`: a channel with missing parts, which the schema check reports.
     channels: Vec<Option<Channel>>,
 }
 
-/// What one channel changes.
+/// One channel: its target and its sampler.
 #[derive(Clone, Debug)]
 struct Channel {
     target: Target,
@@ -38,9 +38,9 @@ struct Channel {
     input: Index<Accessor>,
     output: Index<Accessor>,
     interpolation: Interpolation,
-    /// What the numbers of its output may be.
+    /// Number types allowed in the output.
     numbers: Numbers,
-    /// Whether it names a node beside a pointer.
+    /// Whether the channel names a node beside a pointer.
     has_needless_node: bool,
 }
 
@@ -49,26 +49,26 @@ enum Target {
     Node(usize, Property),
     /// KHR_animation_pointer: other numbers of the document.
     Pointed(Pointed),
-    /// A pointer to nothing, and why it is none.
+    /// A pointer without a target, and the reason.
     Lost(String),
-    /// No node, which means that an extension unknown here says what is changed.
+    /// No node, no declared pointer, or `extras`: only an extension unknown here could say what changes.
     Nothing,
 }
 
-/// What numbers may be.
+/// Number types that the output of a channel may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Numbers {
     Floats,
-    /// Floats, or integers that stand for -1…1.
+    /// Floats, or normalised integers.
     Units,
-    /// Floats and integers of all kinds.
+    /// Floats and all integers.
     All,
-    /// Unsigned bytes that stand for themselves.
+    /// Unsigned bytes, not normalised.
     Bytes,
 }
 
 impl Numbers {
-    /// Whether an accessor holds such numbers.
+    /// Returns whether an accessor of this format has such numbers.
     fn fits(self, format: Format) -> bool {
         let is_float = format.component == ComponentType::F32;
         match self {
@@ -90,7 +90,7 @@ impl Numbers {
 }
 
 impl Target {
-    /// The node or mesh whose morph targets get other weights.
+    /// Returns the node or mesh whose morph weights change.
     fn morphed(&self) -> Option<Entry> {
         match self {
             Self::Node(node, Property::Weights) => Some(Entry::Node(*node)),
@@ -123,7 +123,7 @@ impl Property {
         }
     }
 
-    /// What keys of it may be made of, where no pointer leads to it: places and scales go beyond -1…1.
+    /// Number types of the keys of a property that no pointer addresses: translations and scales exceed −1…1.
     fn numbers(self) -> Numbers {
         match self {
             Self::Translation | Self::Scale => Numbers::Floats,
@@ -132,7 +132,7 @@ impl Property {
     }
 }
 
-/// All animations of a document that the schema check has seen.
+/// Returns all animations of a document that has passed the schema check.
 pub(super) fn all(root: &Value) -> Vec<Animation> {
     let accessors = list(root, "accessors").len();
     list(root, "animations").iter().map(|animation| Animation::of(root, animation, accessors)).collect()
@@ -166,33 +166,33 @@ impl Animation {
         }
     }
 
-    /// What its pointers lead to, whether that can be played or not.
+    /// Targets of the pointers, playable or not.
     fn pointed(&self) -> impl Iterator<Item = &Pointed> {
         let targets = self.channels.iter().flatten().map(|channel| &channel.target);
         targets.filter_map(|target| if let Target::Pointed(pointed) = target { Some(pointed) } else { None })
     }
 
-    /// Whether moments of it may show other materials, or other nodes, than others.
+    /// Returns whether the materials, or the set of visible nodes, may differ between moments.
     pub(super) fn changes_materials(&self) -> bool {
         self.pointed().any(Pointed::changes_materials)
     }
 
-    /// Whether it switches nodes on and off.
+    /// Returns whether the animation switches nodes on and off.
     pub(super) fn switches(&self) -> bool {
         self.pointed().any(|pointed| pointed.form == Form::Switch)
     }
 
-    /// The name in quotes, or else the number: what messages call it.
+    /// Name of the animation in messages: its own in quotes, or else its index.
     pub(super) fn called(&self, number: usize) -> String {
         let name = self.name.as_deref().filter(|name| !name.is_empty());
         name.map_or_else(|| number.to_string(), |name| format!("'{name}'"))
     }
 }
 
-/// What there is to say about all of them.
+/// Summaries of all animations.
 ///
-/// The length of one is that of the `max` of its times, which glTF asks for; where it is missing, the last of them, which
-/// ascend. That one alone is read: any number of accessors may lie over each other.
+/// The length of an animation is the `max` that glTF requires of its times, or else the last time, since times ascend. Only that
+/// time is read: any number of accessors may overlap.
 pub(super) fn facts(animations: &[Animation], reader: Reader) -> Vec<AnimationFacts> {
     let mut ends: HashMap<usize, f64> = HashMap::new();
     let mut end = |input: Index<Accessor>| {
@@ -215,17 +215,17 @@ pub(super) fn facts(animations: &[Animation], reader: Reader) -> Vec<AnimationFa
     animations.iter().map(of).collect()
 }
 
-/// The extension by which channels change other things than nodes.
+/// The extension that lets channels target other properties than those of nodes.
 const POINTER: &str = "KHR_animation_pointer";
 
 fn is_pointer(target: &Value) -> bool {
     target.get("path").and_then(Value::as_str) == Some("pointer")
 }
 
-/// What a channel aims at, and with which numbers; `None`: at a property or node that does not exist.
+/// Target of a channel, and the number types it takes; `None` if the property or node does not exist.
 fn target(root: &Value, target: &Value) -> Option<(Target, Numbers)> {
     if is_pointer(target) {
-        // The schema check has told of a word that the file does not declare.
+        // The schema check reports a pointer whose extension the file does not declare.
         if !list(root, "extensionsUsed").iter().any(|name| name.as_str() == Some(POINTER)) {
             return Some((Target::Nothing, Numbers::All));
         }

@@ -1,4 +1,4 @@
-//! What one moment of an animation does to the nodes, and to numbers that pointers lead to.
+//! Evaluation of an animation at one moment, for nodes and for the targets of pointers.
 
 use super::curve::{self, Between, Interpolation, Key};
 use super::pointer::{Entry, Form, Pointed};
@@ -16,40 +16,40 @@ use serde_json::{Value, json};
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-/// What an animation puts in the place of what the nodes say.
+/// Values that replace those of the document at one moment.
 #[derive(Clone, Debug, Default)]
 pub(in crate::load::gltf) struct Pose {
-    /// Translations, rotations and scales, by node.
+    /// Translations, rotations and scales, by node index.
     pub(in crate::load::gltf) moved: HashMap<usize, Moved>,
-    /// Weights of morph targets, by node.
+    /// Morph weights, by node index.
     pub(in crate::load::gltf) weights: HashMap<usize, Vec<f32>>,
-    /// Weights of morph targets by mesh, for those of its nodes that have none of their own.
+    /// Morph weights by mesh index, for nodes of the mesh without weights of their own.
     pub(super) mesh_weights: HashMap<usize, Vec<f32>>,
-    /// Whether it switches nodes on and off.
+    /// Whether the animation switches nodes on and off.
     pub(in crate::load::gltf) switches: bool,
-    /// What pointers lead to besides, in the order of the file.
+    /// Other changes by pointers, in the order of the file.
     pub(super) changes: Vec<Change>,
 }
 
-/// A value in the place of another.
+/// A new value for the target of a pointer.
 #[derive(Clone, Debug)]
 pub(super) struct Change {
     pub(super) pointed: Pointed,
-    /// A number, a list of numbers, or a truth value.
+    /// A number, a list of numbers, or a boolean.
     pub(super) value: Value,
 }
 
-/// What channels of one animation aim at: no two may at the same.
+/// Targets of the channels of one animation, which must not overlap.
 #[derive(Default)]
 struct Aims {
-    /// All that something aims at, as pointers.
+    /// All targets so far, as pointers.
     whole: HashSet<String>,
-    /// Lists of which something aims at a part.
+    /// Lists that have a target among their elements.
     in_parts: HashSet<String>,
 }
 
 impl Aims {
-    /// Whether nothing aimed there before, or at a part of it, or at what it is a part of.
+    /// Adds a target; returns whether neither it, nor a part of it, nor the list it is a part of was a target before.
     fn insert(&mut self, pointer: String, part_of: Option<String>) -> bool {
         let is_in_a_whole = part_of.as_ref().is_some_and(|list| self.whole.contains(list));
         let is_taken = is_in_a_whole || self.in_parts.contains(&pointer);
@@ -61,7 +61,7 @@ impl Aims {
 /// Evaluates an animation, the `number`th of the file, at `time` seconds.
 ///
 /// # Errors
-/// When its times would take more than is left of `budget`.
+/// If its times would exceed the rest of `budget`.
 pub(in crate::load::gltf) fn play(
     reader: Reader,
     graph: &Graph,
@@ -102,7 +102,7 @@ pub(in crate::load::gltf) fn play(
     Ok(player.pose)
 }
 
-/// Where a channel stands in the file.
+/// Location of a channel in the file, for messages.
 struct ChannelSource<'a> {
     channel: String,
     animation: &'a str,
@@ -120,28 +120,28 @@ impl ChannelSource<'_> {
     }
 }
 
-/// Bytes that a weight of a morph target takes: in the pose, in the posed mesh, and in what tells posed meshes apart.
+/// Bytes per morph weight: in the pose, in the posed mesh, and in the key that identifies posed meshes.
 const WEIGHT: u64 = 3 * size_of::<f32>() as u64;
 
 /// A property of a sampler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
-    /// The times of its keys.
+    /// Times of the keys.
     Input,
     Interpolation,
-    /// The values of its keys.
+    /// Values of the keys.
     Output,
 }
 
-/// Why a channel is left out.
+/// Reason why a channel is left out.
 enum Fault {
-    /// Of the channel itself.
+    /// A fault of the channel itself.
     Target(Code, String),
-    /// Of a part of its sampler.
+    /// A fault in a part of its sampler.
     Sampler(Part, Code, String),
-    /// Of data in a file that cannot be read.
+    /// Unreadable data in a file.
     File(Diagnostic),
-    /// The schema check has told of it.
+    /// A fault that has been reported before.
     Told,
 }
 
@@ -150,7 +150,7 @@ impl Fault {
         let left_out = "the channel is left out";
         match self {
             Self::Target(code, text) => report.warn_with(code, format!("{}.target", place.channel), text, left_out),
-            // Channels share times, and they are looked at once.
+            // Channels share times, which are checked only once.
             Self::Sampler(Part::Input, code, text) => {
                 let left_out = "channels with these times are left out";
                 report.warn_with(code, place.of_sampler(Part::Input), text, left_out);
@@ -176,15 +176,15 @@ struct Player<'a, 'b> {
     time: f64,
     budget: &'b mut Budget,
     report: &'b mut Report,
-    /// Times by accessor: the channels of a skeleton share them. `None`: they cannot be used.
+    /// Key times by accessor: the channels of a skeleton share them. `None`: unusable.
     times: HashMap<usize, Option<Rc<[f32]>>>,
-    /// The nodes and meshes whose weights have been charged.
+    /// Nodes and meshes whose morph weights have been charged to the budget.
     morphed: HashSet<Entry>,
     pose: Pose,
 }
 
 impl<'a> Player<'a, '_> {
-    /// What is said of a second channel.
+    /// Message about a second channel with the same target.
     fn again(&self, target: &Target) -> String {
         match target {
             Target::Node(node, property) => format!("a second channel changes the {} of node {node}", property.name()),
@@ -206,7 +206,7 @@ impl<'a> Player<'a, '_> {
         }))
     }
 
-    /// The times of the keys, read and told of once.
+    /// Key times of a sampler, read and reported only once.
     fn times(&mut self, input: Index<Accessor>, place: &ChannelSource) -> Result<Option<Rc<[f32]>>, OverBudget> {
         if let Some(known) = self.times.get(&input.value()) {
             return Ok(known.clone());
@@ -230,7 +230,7 @@ impl<'a> Player<'a, '_> {
         Ok(times)
     }
 
-    /// The value of a node's property at the moment, put into the pose.
+    /// Evaluates a property of a node into the pose.
     fn property(&mut self, channel: &Channel, node: usize, property: Property, times: &[f32]) -> Result<(), Fault> {
         let between = Between::of(times, self.time);
         let keys = Keys { reader: self.reader, channel, count: times.len() };
@@ -258,7 +258,7 @@ impl<'a> Player<'a, '_> {
         Ok(())
     }
 
-    /// What stands where a pointer leads at the moment, put into the pose.
+    /// Evaluates the target of a pointer into the pose.
     fn pointed(
         &mut self,
         channel: &Channel,
@@ -283,7 +283,7 @@ impl<'a> Player<'a, '_> {
             Form::Numbers(count, range) => {
                 let mut numbers = keys.numbers(between, count)?;
                 for number in numbers.iter_mut().filter(|number| !range.holds(**number)) {
-                    // Splines swing beyond their keys.
+                    // Splines overshoot their keys.
                     if channel.interpolation != Interpolation::CubicSpline {
                         let text = format!("{number} where {range} is allowed");
                         let (code, place) = (Code::ValueNotInRange, place.of_sampler(Part::Output));
@@ -298,7 +298,7 @@ impl<'a> Player<'a, '_> {
         Ok(())
     }
 
-    /// Weights of all morph targets of a node or mesh, or of one of them, at the moment, put into the pose.
+    /// Evaluates the weights of all morph targets of a node or mesh, or of one target, into the pose.
     fn weights(&mut self, keys: &Keys, between: Between, owner: Entry, which: Option<usize>) -> Result<(), Fault> {
         let targets = self.targets(owner);
         if which.map_or(targets == 0, |which| which >= targets) {
@@ -331,7 +331,7 @@ impl<'a> Player<'a, '_> {
         Ok(())
     }
 
-    /// The mesh of a node, or the mesh itself.
+    /// Mesh of a node, or the mesh itself.
     fn mesh(&self, owner: Entry) -> Option<&'a gltf::json::Mesh> {
         let root = self.reader.root;
         let mesh = match owner {
@@ -342,14 +342,14 @@ impl<'a> Player<'a, '_> {
         root.meshes.get(mesh)
     }
 
-    /// How many morph targets it has.
+    /// Number of morph targets of a node or mesh.
     fn targets(&self, owner: Entry) -> usize {
         let primitive = self.mesh(owner).and_then(|mesh| mesh.primitives.first());
         primitive.and_then(|p| p.targets.as_ref()).map_or(0, Vec::len)
     }
 }
 
-/// What the morph targets of a node or mesh weigh when nothing is played.
+/// Morph weights of a node or mesh without animation.
 fn weights_at_rest(reader: Reader, owner: Entry, mesh: Option<&gltf::json::Mesh>, targets: usize) -> Vec<f32> {
     let node = if let Entry::Node(node) = owner { reader.root.nodes.get(node) } else { None };
     let own = node.and_then(|node| node.weights.clone());
@@ -358,7 +358,7 @@ fn weights_at_rest(reader: Reader, owner: Entry, mesh: Option<&gltf::json::Mesh>
     weights
 }
 
-/// Times that are finite and never go back.
+/// Reads key times, which have to be finite, non-decreasing and at least one.
 fn read_times(reader: Reader, input: Index<Accessor>) -> Result<Rc<[f32]>, Fault> {
     let fault = |code, text: String| Fault::Sampler(Part::Input, code, text);
     let format = reader.root.accessors.get(input.value()).and_then(Format::of).ok_or(Fault::Told)?;
@@ -384,12 +384,12 @@ fn read_times(reader: Reader, input: Index<Accessor>) -> Result<Rc<[f32]>, Fault
 struct Keys<'a> {
     reader: Reader<'a>,
     channel: &'a Channel,
-    /// How many keys there are.
+    /// Number of keys.
     count: usize,
 }
 
 impl Keys<'_> {
-    /// Whether the output has the shape, and as many elements as `each` value takes at every key.
+    /// Checks that the output has this shape and `each` elements per value.
     fn check(&self, shape: Type, each: usize) -> Result<(), Fault> {
         let accessor = self.reader.root.accessors.get(self.channel.output.value()).ok_or(Fault::Told)?;
         let format = Format::of(accessor).ok_or(Fault::Told)?;
@@ -412,7 +412,7 @@ impl Keys<'_> {
         Ok(())
     }
 
-    /// So many numbers, up to four, at a moment.
+    /// Interpolates `count` numbers, one to four.
     fn numbers(&self, between: Between, count: usize) -> Result<Vec<f64>, Fault> {
         let shape = match count {
             1 => Type::Scalar,
@@ -430,7 +430,7 @@ impl Keys<'_> {
         Ok(curve::numbers(self.channel.interpolation, between, &before, &after))
     }
 
-    /// The keys around a moment, `each` elements of `N` numbers to a value.
+    /// Reads the two keys around a moment, with values of `each` elements of `N` numbers.
     fn around<const N: usize>(&self, between: Between, each: usize) -> Result<(Key, Key), Fault> {
         let before = self.key::<N>(between.before, each)?;
         let after = if between.after == between.before { before.clone() } else { self.key::<N>(between.after, each)? };

@@ -1,8 +1,8 @@
-//! KHR_animation_pointer: channels that change any number of the document, not only what places nodes.
+//! KHR_animation_pointer: channels that change any number of the document, not only the transforms of nodes.
 //!
-//! What may be changed is what the glTF 2.0 Asset Object Model lists as mutable, which the tables of the schema tell: single
-//! numbers and up to four of them in cameras, lamps and materials, whether a node is visible, and weights of morph targets.
-//! A pointer (RFC 6901) leads to one of them only if all that encloses it is there; itself it need not be.
+//! The mutable properties are those of the glTF 2.0 Asset Object Model, as listed in the tables of the schema: one to four
+//! numbers in cameras, lights and materials, the visibility of nodes, and weights of morph targets. A pointer (RFC 6901) is
+//! valid only if all objects that enclose its target exist; the target itself may be absent.
 
 use super::{Numbers, Property, Target};
 use crate::load::gltf::schema::{Kind, Object, Range};
@@ -10,7 +10,7 @@ use crate::load::gltf::schema_tables::{EXTENSIONS, ROOT};
 use crate::load::gltf::tree::Value;
 use crate::load::paths::shorten;
 
-/// A part of the document that numbers can be changed in.
+/// A part of the document whose properties can be animated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(in crate::load::gltf) enum Entry {
     Camera(usize),
@@ -21,7 +21,7 @@ pub(in crate::load::gltf) enum Entry {
 }
 
 impl Entry {
-    /// Where it stands in the document.
+    /// JSON pointer to the entry.
     pub(super) fn pointer(self) -> String {
         match self {
             Self::Camera(i) => format!("/cameras/{i}"),
@@ -32,7 +32,7 @@ impl Entry {
         }
     }
 
-    /// The entry that these steps from the root lead through, if there is one.
+    /// Returns the entry that a path from the root leads into, if there is one.
     fn of(steps: &[String]) -> Option<Self> {
         let steps: Vec<&str> = steps.iter().map(String::as_str).collect();
         let (entry, number): (fn(usize) -> Self, &str) = match steps[..] {
@@ -46,69 +46,69 @@ impl Entry {
         index(number).map(entry)
     }
 
-    /// How many steps lead to it.
+    /// Number of steps from the root to the entry.
     fn depth(self) -> usize {
         if matches!(self, Self::Light(_)) { 4 } else { 2 }
     }
 }
 
-/// What a pointer leads to.
+/// Target of a pointer.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::load::gltf) struct Pointed {
     /// The part of the document that is changed.
     pub(in crate::load::gltf) entry: Entry,
-    /// The steps from there.
+    /// Steps from the entry to the target.
     pub(in crate::load::gltf) steps: Vec<String>,
     pub(super) form: Form,
 }
 
-/// What stands where a pointer leads.
+/// Type of a pointer's target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Form {
-    /// So many numbers, up to four: one by itself, others in a list.
+    /// One to four numbers; more than one are in a list.
     Numbers(usize, Range),
-    /// True or false.
+    /// A boolean.
     Switch,
-    /// The weights of all morph targets, or that of one.
+    /// The weights of all morph targets, or of one.
     Weights(Option<usize>),
 }
 
 impl Pointed {
-    /// The pointer, written in the one way that it can be.
+    /// The pointer in its canonical spelling.
     pub(super) fn pointer(&self) -> String {
         let steps = self.steps.iter().map(|step| format!("/{}", step.replace('~', "~0").replace('/', "~1")));
         steps.fold(self.entry.pointer(), |pointer, step| pointer + &step)
     }
 
-    /// The pointer to all weights, where this leads to one of them.
+    /// The pointer to the list of all weights, if the target is one weight.
     pub(super) fn whole(&self) -> Option<String> {
         self.weights()?.map(|_| format!("{}/weights", self.entry.pointer()))
     }
 
-    /// Of weights of morph targets: which of them, `Some(None)` being all.
+    /// Index of the targeted morph weight, `Some(None)` for all of them; `None` for other targets.
     pub(super) fn weights(&self) -> Option<Option<usize>> {
         if let Form::Weights(which) = self.form { Some(which) } else { None }
     }
 
-    /// Whether that may change materials, or which nodes are visible.
+    /// Returns whether the target affects materials or the visibility of nodes.
     pub(super) fn changes_materials(&self) -> bool {
         matches!(self.entry, Entry::Material(_)) || self.form == Form::Switch
     }
 
-    /// Which numbers the keys of its channel may be.
+    /// Number types that the keys of the channel may have.
     pub(super) fn numbers(&self) -> Numbers {
         if self.form == Form::Switch { Numbers::Bytes } else { Numbers::All }
     }
 }
 
-/// What a pointer aims at in a document that the schema check has seen.
+/// Resolves a pointer in a document that has passed the schema check.
 ///
 /// # Errors
-/// Why it leads to nothing that can be changed.
+/// The reason why it leads to nothing that can be animated.
 pub(super) fn target(root: &Value, pointer: &str) -> Result<Target, String> {
     let lost = |why: &str| format!("the pointer '{}' {why}", shorten(pointer));
     let steps = steps(pointer).ok_or_else(|| lost("is none: every step starts with a slash"))?;
-    // What lies there is for others to know.
+    // The contents of `extras` belong to applications.
     if steps.iter().any(|step| step == "extras") {
         return Ok(Target::Nothing);
     }
@@ -138,28 +138,28 @@ pub(super) fn target(root: &Value, pointer: &str) -> Result<Target, String> {
     }
 }
 
-/// The steps of a pointer, as the document writes them; `None`: it is no pointer.
+/// Splits a pointer into unescaped steps; `None` if it is malformed.
 fn steps(pointer: &str) -> Option<Vec<String>> {
     let steps = pointer.strip_prefix('/')?.split('/');
     Some(steps.map(|step| step.replace("~1", "/").replace("~0", "~")).collect())
 }
 
-/// A place in a list, which is written in one way only.
+/// Parses an array index in its canonical spelling.
 fn index(step: &str) -> Option<usize> {
     let index: usize = step.parse().ok()?;
     (index.to_string() == step).then_some(index)
 }
 
-/// Where a pointer ends.
+/// End of a pointer's path.
 enum Leaf {
-    /// No rule speaks of it.
+    /// The schema has no rule for the path.
     Unknown,
-    /// Something that would enclose it is not there.
+    /// An enclosing object or list is missing.
     Nowhere,
     Kind(&'static Kind),
 }
 
-/// Follows the steps of a pointer through the rules of the schema and the document beside them.
+/// Follows a path through the rules of the schema and the document in parallel.
 fn leaf(root: &Value, steps: &[String]) -> Leaf {
     let (mut rules, mut kind, mut value): (&Object, Option<&'static Kind>, Option<&Value>) = (&ROOT, None, Some(root));
     let mut rest = steps.iter().map(String::as_str);
@@ -191,7 +191,7 @@ fn leaf(root: &Value, steps: &[String]) -> Leaf {
     kind.map_or(Leaf::Unknown, Leaf::Kind)
 }
 
-/// What of this kind can be animated; of switches only whether nodes are visible.
+/// Animatable form of a property of this kind; of booleans only the visibility of nodes.
 fn form(kind: &Kind, entry: Entry) -> Option<Form> {
     let range = |kind: &Kind| if let Kind::Number(range) = kind { Some(*range) } else { None };
     match kind {

@@ -1,4 +1,4 @@
-//! The document as a moment of an animation has it.
+//! The document at a moment of an animation.
 
 use super::pointer::Entry;
 use super::{Animation, Pose, Target};
@@ -8,16 +8,16 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::collections::HashMap;
 
-/// What pointers aim at, as the file says it.
+/// Original JSON of the entries that pointers target.
 #[derive(Clone, Debug, Default)]
 pub(in crate::load::gltf) struct Originals(HashMap<Entry, Value>);
 
 impl Originals {
-    /// Copies what animations change of JSON that the typed document can be made of.
+    /// Copies the entries that animations change from the JSON.
     pub(in crate::load::gltf) fn of(root: &tree::Value, animations: &[Animation]) -> Self {
         let mut originals = HashMap::new();
         for channel in animations.iter().flat_map(|animation| &animation.channels).flatten() {
-            // Weights are changed in the typed document: meshes may be large.
+            // Weights are changed in the typed document, as meshes may be large.
             if let Target::Pointed(pointed) = &channel.target
                 && pointed.weights().is_none()
                 && let Some(part) = root.pointer(&pointed.entry.pointer())
@@ -30,12 +30,12 @@ impl Originals {
 }
 
 impl Pose {
-    /// Whether anything but nodes is changed.
+    /// Returns whether the pose changes more than nodes' transforms and weights.
     pub(in crate::load::gltf) fn changes_document(&self) -> bool {
         !self.changes.is_empty() || !self.mesh_weights.is_empty()
     }
 
-    /// The document at the moment. Parts that broke the schema, which has been told, stay as they are.
+    /// Returns the document at the moment. Entries that broke the schema, which has been reported, are unchanged.
     pub(in crate::load::gltf) fn posed(&self, root: &Root, originals: &Originals) -> Root {
         let mut posed = root.clone();
         for (&mesh, weights) in &self.mesh_weights {
@@ -55,7 +55,7 @@ impl Pose {
     }
 }
 
-/// Puts a value where the steps lead; nowhere if what encloses it is not there.
+/// Inserts a value at a path; does nothing if an enclosing object is missing.
 fn put(part: &mut Value, steps: &[String], value: Value) {
     let Some((last, way)) = steps.split_last() else { return };
     let enclosing = way.iter().try_fold(part, |part, step| part.get_mut(step));
@@ -64,7 +64,7 @@ fn put(part: &mut Value, steps: &[String], value: Value) {
     }
 }
 
-/// Puts a part in the place of the one that stands there.
+/// Replaces an entry of the document.
 fn replace(root: &mut Root, entry: Entry, part: Value) {
     fn set<T: for<'a> Deserialize<'a>>(slot: Option<&mut T>, part: Value) {
         if let Some((slot, part)) = slot.zip(serde_json::from_value(part).ok()) {

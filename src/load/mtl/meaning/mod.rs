@@ -1,14 +1,14 @@
-//! A material as written -> a material as it is drawn.
+//! Material as written -> material as drawn.
 //!
-//! MTL has many careless writers. Under [`MtlMode::Guess`] the values that no one can have meant are replaced, each with a
-//! counted warning; under [`MtlMode::Literal`] the text counts. Both agree on this: colours are linear (the founding texts
-//! know nothing else, and Blender writes them so; [`super::writer`] tells when they are guessed not to be) and pictures
-//! sRGB-coded; surfaces are seen from both sides; `illum` 3 and above mirror by `Ks`, of these 4, 6, 7 and 9 are
-//! transparent and let through what they do not mirror, 5 and 7 have Fresnel's balance; a material with fields of
-//! physically based rendering (`Pr`, `Pm`, …) is one, and its `Ks` is not used.
+//! MTL has many careless writers. Under [`MtlMode::Guess`] values that no one can have meant are replaced, each with a counted
+//! warning; under [`MtlMode::Literal`] the text counts. In both, colours are linear (the original specification knows nothing
+//! else, and Blender writes them so; [`super::writer`] guesses when they are not) and pictures sRGB-coded; surfaces are
+//! double-sided; `illum` 3 and above mirror by `Ks`; of these 4, 6, 7 and 9 are transparent and transmit what they do not
+//! mirror, and 5 and 7 weigh both by Fresnel; a material with fields of physically based rendering (`Pr`, `Pm`, …) is physically
+//! based, and its `Ks` is not used.
 //!
-//! The numbers come first ([`Meaning`]), then the pictures ([`super::textures`]): what a factor means may depend on
-//! whether its map could be read.
+//! The numbers come first ([`Meaning`]), then the pictures ([`super::textures`]): the meaning of a factor may depend on whether
+//! its map could be read.
 
 use super::parse::{Mtl, Slot};
 use super::writer::{Writer, light};
@@ -18,37 +18,37 @@ use crate::math::Vec3;
 use crate::scene::{AlphaMode, Anisotropy, Coat, Material, MetalRough, Phong, Reflection, Sheen};
 use std::path::Path;
 
-/// Diffuse colour of a material that gives none: that of [`Material::plain`].
+/// Default diffuse colour: that of [`Material::plain`].
 const NO_DIFFUSE: f32 = 0.6;
-/// Exponent of a highlight whose width nobody gave: that of a satin finish.
+/// Default Phong exponent: that of a satin finish.
 const NO_SHININESS: f64 = 32.0;
 /// Roughness of the fibres of cloth.
 const SHEEN_ROUGHNESS: f32 = 0.3;
-/// Index of refraction of glass nobody gave one for.
+/// Default index of refraction of glass.
 const NO_IOR: f64 = 1.5;
 
-/// Gathers the numbers of one material.
+/// Computes the numbers of one material.
 pub(super) struct Meaning<'a> {
     pub mtl: &'a Mtl,
     pub mode: MtlMode,
-    /// Who wrote it.
+    /// Program that wrote the library.
     pub writer: Writer,
-    /// Where warnings say it was.
+    /// Path of the library, for warnings.
     pub file: &'a Path,
     pub warnings: &'a mut Warnings,
-    /// Whether the picture of a slot could be read.
+    /// Returns whether the picture of a slot could be read.
     pub has_map: &'a dyn Fn(Slot) -> bool,
     /// Whether every material in use has an opacity of 0.
     pub all_invisible: bool,
 }
 
 impl Meaning<'_> {
-    /// The material, without its maps.
+    /// Returns the material, without its maps.
     pub(super) fn material(&mut self) -> Material {
         let illum = self.illum();
         let opacity = self.opacity();
         let glass = self.glass(illum, opacity);
-        // Opaque, `illum` of glass says nothing: some programs write it of everything.
+        // On an opaque material an `illum` of glass means nothing: some programs write it for everything.
         let illum = if is_of_glass(illum) && !glass { 2 } else { illum };
         let passed = self.passed(glass, opacity);
         let kd = self.diffuse();
@@ -60,9 +60,9 @@ impl Meaning<'_> {
         } else {
             Reflection::Phong(self.phong(illum, kd, passed))
         };
-        // Of glass, what does not pass is scattered; a physically based model finds that share itself.
+        // In glass, the share that is not transmitted is scattered; a physically based model computes that share itself.
         let kept = if glass && !physical && self.mtl.d.is_some() { opacity } else { 1.0 };
-        // A physically based model lets through as much of each colour as its base colour says.
+        // A physically based model tints transmission by the base colour.
         let tint = if physical && passed != Vec3::ZERO { passed / passed.max_element() } else { Vec3::ONE };
         let blended = !glass && opacity < 1.0;
         Material {
@@ -86,7 +86,7 @@ impl Meaning<'_> {
         self.warnings.push(Diagnostic::new(code, self.file, line, text).remedy("--mtl literal follows the text"));
     }
 
-    /// A number from 0 to 1; the nearest of these, which is told, for any other.
+    /// Clamps a number to 0 … 1, with a warning if it is outside.
     fn part(&mut self, what: &str, value: f64) -> f32 {
         let nearest = value.clamp(0.0, 1.0);
         if nearest != value {
@@ -113,7 +113,7 @@ impl Meaning<'_> {
                 self.warn("mtl-illum-of-writer", "illum 9 of Blender is blended as d says: it is no glass");
                 2
             }
-            // A metal that is blended.
+            // A blended metal.
             Some(6) if self.is_of_blender() => 3,
             Some(illum) => illum,
             None => 2,
@@ -150,7 +150,7 @@ impl Meaning<'_> {
         self.under_map(Slot::Diffuse, self.mtl.kd, default, "Kd")
     }
 
-    /// A factor; black under a map counts as white, because many programs write 0 when the map replaces the colour.
+    /// Factor of a slot; black under a map counts as white, because many programs write 0 when the map replaces the colour.
     fn under_map(&mut self, slot: Slot, factor: Option<[f64; 3]>, default: Vec3, name: &str) -> Vec3 {
         let mapped = (self.has_map)(slot);
         match factor {
@@ -172,9 +172,9 @@ impl Meaning<'_> {
         }
     }
 
-    /// Tells of a colour that no light or surface has, which is taken as it is but for what is negative.
+    /// Warns of a colour that no light or surface can have; it is used as given, except that negative parts count as 0.
     fn tell_unreal(&mut self, slot: Slot, factor: [f64; 3], name: &str) {
-        // Rounded conversions end a little beyond 1.
+        // Rounding in conversions overshoots 1 a little.
         const MOST: f64 = 1.01;
         let what = match slot {
             _ if factor.iter().any(|x| *x < 0.0) => "parts below 0 count as 0",
@@ -187,7 +187,7 @@ impl Meaning<'_> {
         self.warnings.push(Diagnostic::new("mtl-range", self.file, self.mtl.line.to_string(), text));
     }
 
-    /// `d`, or 1 − `Tr`, 0 … 1.
+    /// Opacity: `d`, or 1 − `Tr`, clamped to 0 … 1.
     fn opacity(&mut self) -> f32 {
         let (d, tr) = (self.mtl.d, self.mtl.tr);
         let opacity = match (d, tr) {
@@ -224,18 +224,18 @@ impl Meaning<'_> {
         self.part("opacity (d, or 1 - Tr)", opacity)
     }
 
-    /// Whether light is refracted.
+    /// Returns whether the material refracts light.
     fn glass(&mut self, illum: i32, opacity: f32) -> bool {
         let asked = is_of_glass(illum);
-        // White lets everything pass and black nothing, and opaque materials are written with either.
+        // White transmits everything and black nothing, and exporters write either for opaque materials.
         let mut filters = self.mtl.tf.is_some_and(|tf| tf != [1.0; 3] && tf != [0.0; 3]);
-        // 3ds Max has one number for both.
+        // 3ds Max writes one number as both.
         let is_opacity = |tf: [f64; 3]| tf.iter().all(|part| (part - f64::from(opacity)).abs() < 0.01);
         if self.guessing() && !asked && filters && opacity < 1.0 && self.mtl.tf.is_some_and(is_opacity) {
             self.warn("mtl-filter-is-opacity", "Tf is d once more and filters nothing");
             filters = false;
         }
-        // A filter says nothing of what says in words that it lets nothing pass.
+        // An explicit opacity of 1 overrides the filter.
         let says_opaque = opacity >= 1.0 && (self.mtl.d.is_some() || self.mtl.tr.is_some());
         let filters = (filters && (asked || !says_opaque)) || self.is_glass_of_blender();
         let passes = opacity < 1.0 || filters;
@@ -251,7 +251,7 @@ impl Meaning<'_> {
         }
     }
 
-    /// Weight of the refracted ray: what `Tf` lets through of what `d` leaves.
+    /// Weight of the refracted ray: the filter `Tf`, times 1 − `d` where `d` is below 1.
     fn passed(&self, glass: bool, opacity: f32) -> Vec3 {
         if !glass {
             return Vec3::ZERO;
@@ -281,10 +281,10 @@ impl Meaning<'_> {
         }
         let (specular, shininess) = self.highlight(illum, ks);
         let fresnel = matches!(illum, 5 | 7);
-        // Fresnel's balance needs something to balance: glass mirrors what it does not let through.
+        // Fresnel needs something to balance: glass mirrors what it does not transmit.
         let mirror = if mirrors && glass && fresnel && ks == Vec3::ZERO && self.guessing() { transmission } else { ks };
         let mirror = if mirrors { mirror } else { Vec3::ZERO };
-        // What is mirrored does not pass. Fresnel finds what is by the angle, and a map by the place.
+        // What is mirrored is not transmitted. Fresnel decides by angle, a map by place.
         let is_even = !fresnel && !(self.has_map)(Slot::Specular);
         let kept = if is_even { Vec3::ONE - mirror.min(Vec3::ONE) } else { Vec3::ONE };
         let transmission = transmission * kept;
@@ -303,7 +303,7 @@ impl Meaning<'_> {
         }
     }
 
-    /// `Ka` is what most programs write without looking: 0, 1, or a copy of `Kd`.
+    /// Ambient colour. Most programs write `Ka` carelessly: 0, 1, or a copy of `Kd`.
     fn ambient(&mut self, kd: Vec3) -> Vec3 {
         let ka = self.mtl.ka.map(color);
         if !self.guessing() {
@@ -319,7 +319,7 @@ impl Meaning<'_> {
         if illum <= 1 || ks == Vec3::ZERO {
             return (Vec3::ZERO, 1.0);
         }
-        // Below 1 a highlight would be wider than what lies in the light.
+        // An exponent below 1 would make the highlight wider than the diffuse lobe.
         let narrowest_told = if self.guessing() { 1.0 } else { f64::MIN_POSITIVE };
         match self.mtl.ns {
             Some(ns) if ns >= narrowest_told => (ks, number(ns)),
@@ -337,8 +337,8 @@ impl Meaning<'_> {
         }
     }
 
-    /// A physically based material. Roughness that is not given comes from `Ns`, as the width of the highlight
-    /// (B. Walter et al., "Microfacet Models for Refraction through Rough Surfaces", 2007: α² = 2 / (n + 2)).
+    /// Metal-rough parameters. Roughness that is not given follows from the exponent `Ns` (B. Walter et al., "Microfacet Models
+    /// for Refraction through Rough Surfaces", 2007: α² = 2 / (n + 2)).
     fn metal_rough(&mut self, glass: bool, passed: Vec3) -> MetalRough {
         let packed = (self.has_map)(Slot::OcclusionRoughMetal) || (self.has_map)(Slot::RoughMetalOcclusion);
         let roughness = match self.mtl.pr {
@@ -366,7 +366,7 @@ impl Meaning<'_> {
         MetalRough {
             metallic: self.part("Pm", metallic),
             roughness: self.part("roughness (Pr)", roughness),
-            // 1 is what programs write that have no such field; a dielectric without reflection is not meant.
+            // Programs without such a field write 1; a dielectric without reflection is not meant.
             ior: if ior > 1.0 { ior } else { number(NO_IOR) },
             transmission: passed.max_element(),
             thick: glass,
@@ -377,28 +377,28 @@ impl Meaning<'_> {
         }
     }
 
-    /// Whether what Blender means is known better than what its text says.
+    /// Returns whether the conventions of Blender override the text.
     fn is_of_blender(&self) -> bool {
         self.guessing() && self.writer == Writer::Blender
     }
 
-    /// Whether it is a metal as Blender wrote them before it had fields for them.
+    /// Returns whether this is a metal as Blender wrote it before MTL had fields for metals.
     fn is_metal_of_blender(&self) -> bool {
         self.is_of_blender() && matches!(self.mtl.illum, Some(3 | 6)) && !self.mtl.is_physical()
     }
 
-    /// Whether light passes as Blender writes it beside fields of physically based materials, where any does.
+    /// Returns whether this is glass as Blender writes it: `Tf` beside physically based fields.
     fn is_glass_of_blender(&self) -> bool {
         self.is_of_blender() && self.mtl.is_physical() && self.mtl.tf.is_some_and(|tf| tf != [0.0; 3])
     }
 
-    /// `Ps`: white fibres. No field tells their roughness.
+    /// Sheen: `Ps` as the strength of white fibres. No field gives their roughness.
     fn sheen(&self) -> Option<Sheen> {
         let strength = self.share_under(Slot::Sheen, self.mtl.ps)?;
         Some(Sheen { color: Vec3::splat(strength), color_map: None, roughness: SHEEN_ROUGHNESS, roughness_map: None })
     }
 
-    /// `Pc`, `Pcr`.
+    /// Clear coat: `Pc`, `Pcr`.
     fn coat(&self) -> Option<Coat> {
         Some(Coat {
             strength: self.share_under(Slot::Coat, self.mtl.pc)?,
@@ -410,15 +410,15 @@ impl Meaning<'_> {
         })
     }
 
-    /// `aniso`, `anisor`.
+    /// Anisotropy: `aniso`, `anisor`.
     fn anisotropy(&self) -> Option<Anisotropy> {
-        // A map of turns has them in its picture.
+        // A map of rotations contains the angle itself.
         let turns = self.mtl.anisor.filter(|_| !(self.has_map)(Slot::AnisotropyRotation));
         let rotation = turns.map_or(0.0, |turns| number(turns.rem_euclid(1.0) * std::f64::consts::TAU));
         Some(Anisotropy { strength: self.share_under(Slot::Anisotropy, self.mtl.aniso)?, rotation, map: None })
     }
 
-    /// The share that a map is multiplied by: all where no number is given, or a careless 0.
+    /// Factor of a map: 1 where no number is given, or a careless 0.
     fn share_under(&self, slot: Slot, of: Option<f64>) -> Option<f32> {
         match of {
             None if (self.has_map)(slot) => Some(1.0),
@@ -428,14 +428,14 @@ impl Meaning<'_> {
     }
 }
 
-/// Whether `illum` asks for light to be refracted.
+/// Returns whether an `illum` asks for refraction.
 fn is_of_glass(illum: i32) -> bool {
     matches!(illum, 4 | 6 | 7 | 9)
 }
 
-/// Whether a colour, of what sends back no more light than falls on it, is one of 0…255.
+/// Returns whether a colour that should be at most 1 is given in 0…255.
 fn are_bytes(color: [f64; 3]) -> bool {
-    /// More than anybody means who means more than all light.
+    /// Larger than any colour above 1 that is meant.
     const LEAST: f64 = 16.0;
     color.iter().any(|&x| x >= LEAST) && color.iter().all(|x| (0.0..=255.0).contains(x) && x.fract() == 0.0)
 }
@@ -444,12 +444,12 @@ fn words_of(color: [f64; 3]) -> String {
     color.map(|x| x.to_string()).join(" ")
 }
 
-/// A share of at most 1; `None` where nothing of it is there.
+/// A share clamped to at most 1; `None` if it is missing or not positive.
 fn share(of: Option<f64>) -> Option<f32> {
     of.map(|x| number(x.clamp(0.0, 1.0))).filter(|x| *x > 0.0)
 }
 
-/// A colour, never negative.
+/// Converts a colour to `f32`, with negative parts cut to 0.
 pub(super) fn color(c: [f64; 3]) -> Vec3 {
     Vec3::from(c.map(number)).max(Vec3::ZERO)
 }

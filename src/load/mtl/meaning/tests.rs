@@ -33,7 +33,7 @@ fn read_of(comment: &str, text: &str, mode: MtlMode, maps: &[Slot]) -> (Material
     (material, warnings.into_vec())
 }
 
-/// A material in a file that begins with a comment.
+/// Reads a material of a file that begins with this comment.
 fn guess_of(comment: &str, text: &str, maps: &[Slot]) -> (Material, Vec<&'static str>) {
     let (material, warnings) = read_of(comment, text, MtlMode::Guess, maps);
     (material, warnings.iter().map(|w| w.code).collect())
@@ -153,7 +153,7 @@ fn parts_outside_of_0_to_1_are_told_and_the_nearest_counts() {
     let (m, warnings) = guess("Kd 1\nPm 5\nPr 0.5");
     assert_eq!((m.metal_rough().unwrap().metallic, warnings), (1.0, vec!["mtl-range"]));
     assert!(guess("Kd 1\nPm 1\nPr 0\nd 1").1.is_empty());
-    // Colours stay as they are: light may be brighter than white.
+    // Colours are not clamped: light may be brighter than white.
     let (m, warnings) = guess("Kd 1.5 1 0\nKe 4 4 4");
     assert_eq!((m.base_color, warnings), (Vec3::new(1.5, 1.0, 0.0), vec!["mtl-range"]));
     assert_eq!(guess("Kd 2.5 2.5 2.5").0.base_color, Vec3::splat(2.5));
@@ -197,7 +197,7 @@ fn what_programs_write_of_everything_makes_no_mirrors_and_no_glass() {
     let (m, warnings) = guess_of("# VTK, the Visualization Toolkit", "Kd 1 0 0\nTr 0.2", &[]);
     assert_eq!((m.opacity, warnings), (0.2, vec!["mtl-tr-as-opacity"]));
     assert_eq!(guess_of("# VTK, the Visualization Toolkit", "Kd 1 0 0\nTr 1", &[]).0.opacity, 1.0);
-    // 3ds Max writes opacity as Tf, too.
+    // 3ds Max writes the opacity as `Tf`, too.
     let (m, warnings) = guess("Kd .26 .26 .26\nNi 1.5\nd 0.1\nTr 0.9\nTf 0.1 0.1 0.1\nillum 2");
     assert_eq!((m.opacity, m.alpha_mode, warnings), (0.1, AlphaMode::Blend, vec!["mtl-filter-is-opacity"]));
     assert_eq!(phong(&m).transmission, Vec3::ZERO);
@@ -219,7 +219,7 @@ fn what_blender_blends_is_no_glass_and_its_glass_is_what_has_a_filter() {
     assert_eq!((m.opacity, m.alpha_mode), (0.3, AlphaMode::Blend));
     assert_eq!(warnings, ["mtl-illum-of-writer", "mtl-ambient"]);
     assert_eq!((phong(&m).mirror, phong(&m).transmission), (Vec3::ZERO, Vec3::ZERO));
-    // A metal of which a half is there.
+    // A metal of opacity 0.5.
     let (m, warnings) = of("Ns 10\nKa 1 1 1\nKd 0.8 0.6 0.2\nKs 0.5 0.5 0.5\nNi 1.5\nd 0.5\nillum 6");
     let metal = m.metal_rough().unwrap();
     assert_eq!((metal.metallic, metal.transmission, m.alpha_mode), (1.0, 0.0, AlphaMode::Blend));
@@ -231,7 +231,7 @@ fn what_blender_blends_is_no_glass_and_its_glass_is_what_has_a_filter() {
     let (m, _) = of(&format!("{physical}\nTf 1 1 1"));
     assert_eq!((passed(&m), m.base_color), ((1.0, true), Vec3::new(0.9, 1.0, 0.9)));
     assert_eq!(passed(&of(&format!("{physical}\nTf 0.5 0.5 0.5")).0), (0.5, true));
-    // Others write a white filter of everything.
+    // Other programs write a white filter for every material.
     assert_eq!(passed(&guess_of("# another", &format!("{physical}\nTf 1 1 1"), &[]).0), (0.0, false));
 }
 
@@ -253,7 +253,7 @@ fn materials_of_which_nothing_is_known_are_grey() {
     assert_eq!(m.base_color, Vec3::splat(NO_DIFFUSE));
     assert!(warnings.contains(&"mtl-no-diffuse"), "{warnings:?}");
     assert_eq!(literal(unknown).base_color, Vec3::ZERO);
-    // Black that somebody chose.
+    // Black by intention.
     assert_eq!(guess("Kd 0 0 0\nNi 1").0.base_color, Vec3::ZERO);
     assert_eq!(of("Kd 0.5 0.5 0.5\nd 0\nmap_Kd a.png", MtlMode::Guess, &[Slot::Diffuse]).0.opacity, 1.0);
 }
