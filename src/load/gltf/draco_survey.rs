@@ -116,7 +116,7 @@ struct Attribute {
 
 struct Walk<'a> {
     cursor: Cursor<'a>,
-    /// Values that an attribute may have.
+    /// Largest number of values that an attribute may have.
     most: u64,
 }
 

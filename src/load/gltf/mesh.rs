@@ -1,4 +1,4 @@
-//! One primitive of a mesh -> a [`Mesh`] of the scene: morphed, posed by its skin, cleaned.
+//! One primitive of a mesh -> a [`Mesh`] of the scene: morphed, skinned, cleaned.
 
 use super::accessor::{Format, Pick, Reader, Unreadable};
 use super::codes::Code;
@@ -15,30 +15,30 @@ use gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use std::ops::AddAssign;
 
-/// What to read and how.
+/// A primitive to read, and how.
 pub(super) struct Job<'a> {
     pub(super) primitive: &'a Primitive,
     /// JSON path of the primitive.
     pub(super) place: String,
     pub(super) name: &'a str,
-    /// Weights of the morph targets; missing ones are zero.
+    /// Morph weights; missing ones are zero.
     pub(super) weights: &'a [f32],
-    /// What these change of colours and texture coordinates, target by target.
+    /// Changes of colours and texture coordinates by morph targets, ordered by target.
     pub(super) changes: &'a [Change],
     pub(super) skin: Option<&'a Skin>,
     pub(super) needs: Needs,
-    /// Whether anything of it is drawn; if not it is read only to be checked.
+    /// Whether any of it is drawn; otherwise it is read only to be checked.
     pub(super) drawn: bool,
-    /// Whether normals that are missing will be made smooth; tangents wait for them.
+    /// Whether missing normals will be smoothed; tangents are then generated later.
     pub(super) smooths: bool,
 }
 
-/// What the material reads of the vertices.
+/// Vertex attributes that a material reads.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Needs {
     /// Texture coordinate sets.
     pub(super) uv_sets: Vec<u32>,
-    /// The coordinates that tangents follow: those of a normal map.
+    /// Texture coordinates that tangents follow: those of a normal map.
     pub(super) tangents: Option<TexCoords>,
 }
 
@@ -47,24 +47,24 @@ impl Job<'_> {
         self.weights.get(target).copied().filter(|w| w.is_finite()).unwrap_or(0.0)
     }
 
-    /// Whether a morph target is read: it has weight, or nothing is drawn and all is only checked.
+    /// Returns whether a morph target is read: it has weight, or the primitive is only checked.
     fn reads_target(&self, target: usize) -> bool {
         self.weight(target) != 0.0 || !self.drawn
     }
 }
 
-/// What a primitive gave.
+/// Result of reading a primitive.
 #[derive(Default)]
 pub(super) struct Read {
     pub(super) mesh: Mesh,
-    /// Where the mesh stands when a skin has placed it.
+    /// Centre of the skin, to which positions are relative; `None` without a skin.
     pub(super) center: Option<DVec3>,
     pub(super) dropped: Dropped,
-    /// Its lines, as [`crate::load::wires::Wires::ends`]; there are no triangles then.
+    /// Lines, as [`crate::load::wires::Wires::ends`]; there are no triangles then.
     pub(super) lines: Vec<[u32; 2]>,
 }
 
-/// Reads one primitive; `None` when there is nothing to draw in it.
+/// Reads one primitive; `None` when nothing in it can be drawn.
 pub(super) fn read(reader: Reader, job: &Job, report: &mut Report) -> Option<Read> {
     let Checked::Valid(mode) = job.primitive.mode else { return None };
     let positions = job.primitive.attributes.get(&Checked::Valid(Semantic::Positions))?;
@@ -73,11 +73,11 @@ pub(super) fn read(reader: Reader, job: &Job, report: &mut Report) -> Option<Rea
     task.run(mode)
 }
 
-/// Bytes that reading a primitive takes, by the declared counts.
+/// Memory for reading a primitive, in bytes, by the declared counts.
 ///
-/// Of a pool of vertices only those are read that the indices name, so that there are at most as many as indices.
+/// Only vertices that the indices name are read, so at most as many as there are indices.
 pub(super) fn cost(reader: Reader, job: &Job) -> u64 {
-    /// A value of a vertex, at most four floats.
+    /// Largest vertex attribute: four floats.
     const VALUE: u64 = 16;
     let primitive = job.primitive;
     let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
@@ -89,7 +89,7 @@ pub(super) fn cost(reader: Reader, job: &Job) -> u64 {
     let morphs = (morphs + job.changes.iter().filter(|change| job.reads_target(change.target)).count()) as u64;
     let values = primitive.attributes.len() as u64;
     let faces = match primitive.mode {
-        // Nearly every corner starts a face of three.
+        // Nearly every corner starts a triangle.
         Checked::Valid(Mode::TriangleStrip | Mode::TriangleFan) => 36,
         _ => 24,
     };
@@ -98,7 +98,7 @@ pub(super) fn cost(reader: Reader, job: &Job) -> u64 {
         Checked::Valid(Semantic::TexCoords(set)) => Some(*set as usize + 1),
         _ => None,
     };
-    // Sets of texture coordinates stand at their number, and those before it are empty.
+    // Texture coordinate sets are stored at their index, after empty sets for unused indices.
     let sets = primitive.attributes.keys().filter_map(set).max().unwrap_or(0);
     let fixed = (size_of::<Read>() + job.name.len() + sets * size_of::<Vec<Vec2>>()) as u64;
     let bytes = used.saturating_mul((values + morphs) * VALUE).saturating_add(corners.saturating_mul(faces + tangents));
@@ -109,9 +109,9 @@ struct Task<'a, 'b> {
     reader: Reader<'a>,
     job: &'b Job<'b>,
     report: &'b mut Report,
-    /// How many vertices there are to name.
+    /// Number of vertices that can be indexed.
     vertices: u64,
-    /// The vertices that the indices name, when these are not all.
+    /// Vertices that the indices use, unless all are used.
     used: Option<Vec<u32>>,
 }
 
@@ -148,14 +148,14 @@ impl Task<'_, '_> {
         Some(Read { mesh, center, dropped, lines })
     }
 
-    /// The accessor of an attribute, when its format can be read and it has a value for each vertex.
+    /// Accessor of an attribute, if its format is readable and it has one value per vertex.
     fn attribute(&self, semantic: Semantic) -> Option<Index<Accessor>> {
         let index = self.job.primitive.attributes.get(&Checked::Valid(semantic.clone())).copied()?;
         let format = self.reader.root.accessors.get(index.value()).and_then(Format::of)?;
         (is_readable(&semantic, format) && self.reader.count(index) == self.vertices).then_some(index)
     }
 
-    /// The number of the accessor of the indices; of no accessor, where there are none.
+    /// Index of the index accessor; an invalid one if the primitive has no indices.
     fn indices(&self) -> usize {
         self.job.primitive.indices.map_or(usize::MAX, |index| index.value())
     }
@@ -164,7 +164,8 @@ impl Task<'_, '_> {
         format!("{}.{part}", self.job.place)
     }
 
-    /// Unwraps what was read; what cannot be read refuses the file, unless nobody would see it.
+    /// Unwraps read data; a fault refuses the file, except that data without a stated location only costs a warning, and none
+    /// where it is not drawn.
     fn sort_out<T>(&mut self, result: Result<T, Unreadable>, part: &str) -> Option<T> {
         let place = self.place(part);
         match result {
@@ -182,12 +183,12 @@ impl Task<'_, '_> {
         self.sort_out(result, part)
     }
 
-    /// The vertices to read.
+    /// Selects the vertices to read.
     fn pick(&self) -> Pick<'_> {
         self.used.as_deref().map_or(Pick::All, Pick::Only)
     }
 
-    /// The vertex of every corner, numbered among those in use.
+    /// Reads the vertex of every corner, renumbered by the vertices in use.
     fn corners(&mut self, index: Index<Accessor>) -> Option<Vec<u32>> {
         let format = self.reader.root.accessors.get(index.value()).and_then(Format::of)?;
         if format.shape != Type::Scalar || !is_unsigned(format.component) {
@@ -223,7 +224,7 @@ impl Task<'_, '_> {
         None
     }
 
-    /// Reads what goes with the positions.
+    /// Reads the other attributes.
     fn attributes(&mut self, mesh: &mut Mesh) {
         let count = mesh.positions.len();
         if mesh.positions.iter().any(|p| !p.is_finite()) {
@@ -231,7 +232,7 @@ impl Task<'_, '_> {
             self.report.add(Code::AccessorInvalidFloat, place, "positions that are not finite numbers");
         }
         if let Some(index) = self.attribute(Semantic::Normals).filter(|&i| !self.reader.is_blank(i)) {
-            // No direction is zero.
+            // A zero vector is not a direction.
             let normals = self.floats::<3>(index, "attributes.NORMAL").filter(|n| n.len() == count);
             mesh.normals = normals.into_iter().flatten().map(Vec3::from).collect();
         }
@@ -268,7 +269,7 @@ impl Task<'_, '_> {
                 let place = self.place(&part);
                 self.report.add(Code::AccessorInvalidFloat, place, "texture coordinates that are not finite numbers");
             }
-            // Numbers of sets have 16 bits, and empty ones were charged (`cost`).
+            // Set indices have 16 bits, and `cost` includes the empty sets.
             let slot = set as usize;
             if mesh.uvs.len() <= slot {
                 mesh.uvs.resize(slot + 1, Vec::new());
@@ -277,7 +278,7 @@ impl Task<'_, '_> {
         }
     }
 
-    /// Adds the morph targets that have weight.
+    /// Adds the morph targets, multiplied by their weights.
     fn morph(&mut self, mesh: &mut Mesh) {
         let primitive = self.job.primitive;
         let mut changed = false;
@@ -287,8 +288,7 @@ impl Task<'_, '_> {
                 changed |= self.job.weight(k) != 0.0;
             }
         }
-        // Sums with unit vectors are no longer unit, once all is added, nor are those of colours what colours are; that is no
-        // fault of the file.
+        // Weighted sums are neither unit vectors nor within the range of colours any more; that is no fault of the file.
         if changed {
             faces::clamp_colors(&mut mesh.colors);
             mesh.uvs.iter_mut().for_each(|uvs| _ = faces::finite_uvs(uvs));
@@ -323,7 +323,7 @@ impl Task<'_, '_> {
                     let change = |d| (Vec3::from_array(d) * weight).extend(0.0);
                     add(&mut mesh.tangents, self.floats(index, &part), change);
                 }
-                // Of three numbers the fourth, alpha's, is zero.
+                // For RGB the fourth component, alpha, reads as zero.
                 Semantic::Colors(_) => {
                     add(&mut mesh.colors, self.floats(index, &part), |d| Vec4::from_array(d) * weight);
                 }
@@ -336,14 +336,14 @@ impl Task<'_, '_> {
         }
     }
 
-    /// Whether an accessor of a morph target can be read and has a value for each vertex.
+    /// Returns whether an accessor of a morph target is readable and has one value per vertex.
     fn is_change(&mut self, index: Index<Accessor>, attribute: &Semantic, part: &str) -> bool {
         let format = self.reader.root.accessors.get(index.value()).and_then(Format::of);
         if !format.is_some_and(|format| can_change(attribute, format)) {
             return false;
         }
         let (has, vertices) = (self.reader.count(index), self.vertices);
-        // Of others it was told when the JSON was checked.
+        // Other mismatches were reported when the JSON was checked.
         if has != vertices && self.reader.decoded.indices(self.indices()).is_some() {
             let (place, text) = (self.place(part), format!("{has} elements for {vertices} vertices"));
             self.report.add(Code::MeshPrimitiveMorphTargetInvalidAttributeCount, place, text);
@@ -351,7 +351,7 @@ impl Task<'_, '_> {
         has == vertices
     }
 
-    /// Places a skinned mesh by its joints.
+    /// Poses a skinned mesh by its joints; returns the centre of the skin.
     fn pose(&mut self, mesh: &mut Mesh) -> Option<DVec3> {
         let skin = self.job.skin?;
         let mut influences = Influences::default();
@@ -384,7 +384,7 @@ impl Task<'_, '_> {
         Some(skin.center)
     }
 
-    /// Repairs normals and tangents.
+    /// Repairs normals and tangents, with warnings.
     fn directions(&mut self, mesh: &mut Mesh) {
         let normals = faces::repair_normals(mesh);
         if normals.length || normals.none {
@@ -406,7 +406,7 @@ impl Task<'_, '_> {
     }
 }
 
-/// Adds what a morph target changes to what is there, if both are there.
+/// Adds the changes of a morph target, if their count is that of the values.
 fn add<T: AddAssign, const N: usize>(to: &mut [T], changes: Option<Vec<[f32; N]>>, change: impl Fn([f32; N]) -> T) {
     let changes = changes.filter(|changes| changes.len() == to.len()).into_iter().flatten();
     to.iter_mut().zip(changes).for_each(|(value, by)| *value += change(by));
@@ -416,7 +416,7 @@ fn is_unsigned(component: ComponentType) -> bool {
     matches!(component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
 }
 
-/// Whether an attribute makes sense in this format; [`super::attributes`] told the user of those that do not.
+/// Returns whether an attribute is valid in this format; [`super::attributes`] has reported the others.
 fn is_readable(semantic: &Semantic, format: Format) -> bool {
     let (float, unsigned) = (format.component == ComponentType::F32, is_unsigned(format.component));
     let small = format.component != ComponentType::U32;
@@ -434,7 +434,8 @@ fn is_readable(semantic: &Semantic, format: Format) -> bool {
     }
 }
 
-/// Whether a morph target may change an attribute in such a format: colours may become less, and tangents have no handedness.
+/// Returns whether a morph target may change an attribute in this format: changes of colours may be negative, and those of
+/// tangents have no handedness.
 fn can_change(attribute: &Semantic, format: Format) -> bool {
     let small = format.component != ComponentType::U32;
     match attribute {

@@ -1,8 +1,8 @@
-//! Buffer views that hold compressed data: EXT_meshopt_compression and KHR_meshopt_compression.
+//! Compressed buffer views: EXT_meshopt_compression and KHR_meshopt_compression.
 //!
-//! A view with the extension names a stream in another buffer that decodes into `count` elements of `byteStride` bytes,
-//! just the bytes that the view stands for; accessors and images read these as if they had been in the file. The
-//! streams are those of A. Kapoulkine's meshoptimizer, and are decoded by it.
+//! The extension of a view names a stream in another buffer, which decodes to `count` elements of `byteStride` bytes: the
+//! contents of the view. Accessors and images read these as if they had been in the file. The streams are those of A.
+//! Kapoulkine's meshoptimizer, which also decodes them.
 
 use super::buffers::Buffers;
 use super::meshopt_codec::{Filter, Mode, Shape, decode};
@@ -15,28 +15,28 @@ use serde_json::{Map, Value};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// The extension and its predecessor, which has the same properties.
+/// The extension and its predecessor, with the same properties.
 const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
 
-/// What to do about a file that cannot be read as it is.
+/// Remedy for a stream that cannot be decoded.
 const REMEDY: &str = "get the file again, or export it without meshopt compression";
 
-/// The bytes of compressed views, by the number of the view, or why there are none.
+/// Contents of compressed views by view index, or the reason why they could not be decoded.
 pub(super) type Decoded = HashMap<usize, Result<Vec<u8>, Diagnostic>>;
 
-/// The extension of a view, if it has one.
+/// Returns the extension of a view, with its name, if it has one.
 pub(super) fn extension(view: &buffer::View) -> Option<(&'static str, &Map<String, Value>)> {
     let others = &view.extensions.as_ref()?.others;
     NAMES.iter().find_map(|name| Some((*name, others.get(*name)?.as_object()?)))
 }
 
-/// Whether a buffer is declared to hold nothing but what compressed views decode to.
+/// Returns whether a buffer is declared as the fallback of compressed views.
 pub(super) fn is_stand_in(buffer: &buffer::Buffer) -> bool {
     let flag = |name: &str| buffer.extensions.as_ref()?.others.get(name)?.get("fallback")?.as_bool();
     NAMES.iter().any(|name| flag(name) == Some(true))
 }
 
-/// Whether the file says that it cannot be drawn without decoding.
+/// Returns whether the file declares that it cannot be drawn without decoding.
 pub(super) fn is_required(root: &Root) -> bool {
     root.extensions_required.iter().any(|name| NAMES.contains(&name.as_str()))
 }
@@ -58,16 +58,16 @@ struct Task<'a> {
     view: &'a buffer::View,
 }
 
-/// A stream whose sizes have been found to fit.
+/// A stream that passed the checks before decoding.
 struct Plan<'a> {
     bytes: &'a [u8],
     shape: Shape,
-    /// What to say when it turns out to be damaged.
+    /// Diagnostic for a stream that turns out to be damaged.
     fault: Diagnostic,
 }
 
 impl<'a> Task<'a> {
-    /// Checks everything that can be known before decoding, and takes the memory.
+    /// Checks everything that can be checked before decoding, and charges the memory.
     fn plan(
         &self,
         (name, properties): (&'static str, &Map<String, Value>),
@@ -85,7 +85,7 @@ impl<'a> Task<'a> {
             let text = format!("{} bytes cannot decode to {size}", bytes.len());
             return Err(self.fault(name, ".count", text));
         }
-        // Once as decoded, and once as bytes.
+        // Once as decoded elements, and once as bytes.
         budget.take(size, 2).map_err(|over| {
             let Diagnostic { file, place, text, .. } =
                 self.fault(name, "", format!("the decoded view is too large: {over}"));
@@ -95,7 +95,7 @@ impl<'a> Task<'a> {
         Ok(Plan { bytes, shape, fault: self.fault(name, "", text) })
     }
 
-    /// The compressed bytes.
+    /// Returns the compressed bytes.
     fn stream(&self, name: &str, properties: &Map<String, Value>) -> Result<&'a [u8], Diagnostic> {
         let number = |key: &str| properties.get(key).and_then(whole);
         let (Some(buffer), Some(length)) = (number("buffer"), number("byteLength")) else {
@@ -117,7 +117,7 @@ impl<'a> Task<'a> {
         })
     }
 
-    /// What the stream holds, checked against the rules of the extension.
+    /// Returns the shape of the decoded data, checked against the rules of the extension.
     fn shape(&self, name: &str, properties: &Map<String, Value>) -> Result<Shape, Diagnostic> {
         let number = |key: &str| properties.get(key).and_then(whole).unwrap_or(0);
         let word = |key: &str| properties.get(key).and_then(Value::as_str).unwrap_or_default();

@@ -1,19 +1,19 @@
-//! Streams of meshoptimizer -> bytes: which sizes they may have, the decoders, and the filters after them.
+//! meshoptimizer streams -> bytes: checks of their sizes, the decoders, and the filters after them.
 //!
 //! The formats are those of appendices A and B of KHR_meshopt_compression.
 
-/// What elements are.
+/// Type of the encoded elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mode {
-    /// Vertices, or anything else of whole 32-bit words.
+    /// Vertex attributes, or other data in whole 32-bit words.
     Attributes,
-    /// Indices of triangles.
+    /// Indices of a triangle list.
     Triangles,
-    /// Indices in any order.
+    /// Any sequence of indices.
     Indices,
 }
 
-/// What is done to decoded elements.
+/// Filter that is applied to decoded elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Filter {
     /// Nothing.
@@ -29,7 +29,7 @@ pub(super) enum Filter {
 }
 
 impl Mode {
-    /// The mode of that name.
+    /// Returns the mode of this name.
     pub(super) fn of(name: &str) -> Option<Self> {
         Some(match name {
             "ATTRIBUTES" => Self::Attributes,
@@ -41,7 +41,7 @@ impl Mode {
 }
 
 impl Filter {
-    /// The filter of that name; none where nothing is said.
+    /// Returns the filter of this name; no filter for an empty name.
     pub(super) fn of(name: &str) -> Option<Self> {
         Some(match name {
             "" | "NONE" => Self::None,
@@ -54,24 +54,24 @@ impl Filter {
     }
 }
 
-/// What a stream decodes to.
+/// Shape of the data in a stream.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shape {
     pub(super) mode: Mode,
     pub(super) filter: Filter,
-    /// Bytes of an element.
+    /// Bytes per element.
     pub(super) stride: u64,
-    /// Elements.
+    /// Number of elements.
     pub(super) count: u64,
 }
 
 impl Shape {
-    /// Bytes of all elements; `None`: they cannot be counted.
+    /// Bytes of all elements; `None` on overflow.
     pub(super) fn size(&self) -> Option<u64> {
         self.stride.checked_mul(self.count)
     }
 
-    /// Bytes that a stream of `length` bytes can decode to at most.
+    /// Upper bound of the bytes that a stream of `length` bytes decodes to.
     ///
     /// A block of 256 vertices takes at least two bits for each byte of a vertex, a triangle takes a byte, and so does
     /// an index.
@@ -83,7 +83,7 @@ impl Shape {
         })
     }
 
-    /// Checks what the decoders take for granted.
+    /// Checks the preconditions of the decoders.
     ///
     /// # Errors
     /// The property that is wrong, and how.
@@ -114,7 +114,7 @@ impl Shape {
     }
 }
 
-/// Decodes a stream of a shape that has passed its check.
+/// Decodes a stream whose shape has passed [`Shape::check`].
 ///
 /// # Errors
 /// What is wrong with the stream.
@@ -132,7 +132,7 @@ pub(super) fn decode(stream: &[u8], shape: &Shape) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-/// Without the library, says so.
+/// Stub without the library, which returns an error.
 #[cfg(not(feature = "meshopt"))]
 pub(super) fn decode(_: &[u8], _: &Shape) -> Result<Vec<u8>, String> {
     Err("this meshray was built without the feature 'meshopt'".into())
@@ -149,7 +149,7 @@ fn bytes_of<T: Copy, const N: usize>(
 
 #[cfg(feature = "meshopt")]
 mod vertices {
-    //! The library decodes vertices of a size that is known to the compiler.
+    //! Decoding of vertices, whose size the library needs as a compile-time constant.
 
     /// A vertex of `N` words.
     #[derive(Clone, Copy)]
@@ -165,7 +165,7 @@ mod vertices {
     fn words<const N: usize>(stream: &[u8], count: usize) -> Result<Vec<u8>, String> {
         let vertices = ::meshopt::decode_vertex_buffer::<Vertex<N>>(stream, count);
         let vertices = vertices.map_err(|_| "it is damaged".to_owned())?;
-        // The library has written bytes, whatever words they make here.
+        // The library wrote bytes into the words, so the native order restores them.
         Ok(vertices.iter().flat_map(|vertex| vertex.0).flat_map(u32::to_ne_bytes).collect())
     }
 
@@ -189,7 +189,7 @@ mod vertices {
 
 #[cfg(feature = "meshopt")]
 mod filters {
-    //! The library filters elements of a type; bytes are copied into these and back.
+    //! Filters of the library, which take typed elements: bytes are copied to these and back.
 
     use super::{Filter, Shape};
 

@@ -1,19 +1,17 @@
-//! glTF 2.0, core and the extensions that a still picture shows, from `.gltf` or GLB.
+//! glTF 2.0, core and the extensions that matter to a still picture, from `.gltf` or GLB.
 //!
-//! A file goes through four gates. `container` finds the JSON and the binary chunk; `version` and `extensions`
-//! say early what cannot be drawn at all; `schema` checks every value and index, so that the typed document of the
-//! `gltf` crate can be built; `attributes`, `usage`, `graph` and `links` check what parts mean together. Only then is data
-//! read (`accessor`, `mesh`, `images`), each piece with its own bounds. What becomes of a fault is a table
-//! ([`codes`]).
+//! A file passes four gates. `container` finds the JSON and the binary chunk; `version` and `extensions` report early what
+//! cannot be drawn at all; `schema` checks every value and index, so that the typed document of the `gltf` crate can be built;
+//! `attributes`, `usage`, `graph` and `links` check the consistency between parts. Only then is data read (`accessor`, `mesh`,
+//! `images`), with bounds checks of its own. The consequence of each fault is a table ([`codes`]).
 //!
-//! Compressed geometry is decoded before anything reads it: views by `meshopt`, so that they are views like others, and
-//! primitives by `draco`, so that their accessors are accessors like others. Both libraries sit behind features of the
-//! same names; without them, such files are refused with a line that says so.
+//! Compressed geometry is decoded before anything reads it: views by `meshopt`, so that they read like other views, and
+//! primitives by `draco`, so that their accessors read like others. Both libraries sit behind features of the same names;
+//! without them, files that need them are refused with a message that names the feature.
 //!
-//! Points and lines are read like triangles and get a width in the end ([`super::wires`]).
+//! Points and lines are read like triangles and get a width at the end ([`super::wires`]).
 //!
-//! Nodes, morph weights and skins are drawn in their rest pose, or as an animation has them at a moment
-//! ([`Moment`](super::Moment)).
+//! Nodes, morph weights and skins are drawn in their rest pose, or at a moment of an animation ([`Moment`](super::Moment)).
 
 mod accessor;
 mod animation;
@@ -86,10 +84,10 @@ use sparse::Replacements;
 use std::borrow::Cow;
 use weight::Weight;
 
-/// Loads a glTF 2.0 file; whatever that takes comes out of `budget`.
+/// Loads a glTF 2.0 file; all memory is charged to `budget`.
 ///
 /// # Errors
-/// What the table in [`codes`] refuses, all faults of one stage at once.
+/// Faults that the table in [`codes`] refuses, all those of one stage at once.
 pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
     let mut report = Report::new(&source.path);
     let loaded = Loading { source, options, report: &mut report }.run(budget)?;
@@ -97,7 +95,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
     Ok(Loaded { warnings, ..loaded })
 }
 
-/// The number of a mesh, and where a skin has put it.
+/// Index of a mesh, and its placement by a skin.
 type Part = (u32, Option<DAffine3>);
 
 struct Loading<'a> {
@@ -149,7 +147,7 @@ impl Loading<'_> {
         Ok(Loaded { scene, facts, warnings: Vec::new() })
     }
 
-    /// The value, unless the report refuses the file or there is none.
+    /// Returns the value, unless the report refuses the file or there is none.
     fn passed<T>(&mut self, value: Option<T>) -> Result<T, LoadError> {
         self.report.check()?;
         value
@@ -205,7 +203,7 @@ impl Loading<'_> {
             || read_meshes(reader, &placed, &skins, &palette, file),
             || images.decode(root, read, file, &self.options.limits, budget, &mut pictures),
         );
-        // glTF has no word for surroundings: its lights come on top of whatever the viewer puts around the model.
+        // glTF cannot describe surroundings: its lights are added to whatever the viewer puts around the model.
         let environment = Environment::Studio;
         let photometric = !placed.lights.is_empty();
         let (cameras, lights) = (placed.cameras, placed.lights);
@@ -219,14 +217,14 @@ impl Loading<'_> {
             .map_err(|over| self.too_large("what points and lines become", over))?;
         lost.into_iter().for_each(|warning| self.report.warnings.push(warning));
         scene.up = self.options.up.unwrap_or_default();
-        // VRM 0.x says so; from 1.0 on, whose extension has another name, avatars face as glTF says.
+        // VRM 0.x, whose avatars face backwards; from 1.0 on the extension has another name and they face as in glTF.
         scene.faces_back = root.extensions_used.iter().any(|name| name == "VRM");
         (facts.reading, facts.decoding) = (resolver.reading(), decoding);
         (facts.files, facts.hash, facts.gaps) = resolver.finish();
         Ok(scene)
     }
 
-    /// What the wished moment does to the nodes; nothing for a file without animations.
+    /// Evaluates the requested moment; nothing changes in a file without animations.
     fn pose(
         &mut self,
         reader: Reader,
@@ -257,7 +255,7 @@ impl Loading<'_> {
             .map_err(|over| self.too_large("an animation", over))?;
         facts.shown = Some((number, moment.time));
         facts.changes_materials = animation.changes_materials();
-        // Times are stored as `f32`: what falls on the last one when rounded is not past it.
+        // Times are stored as `f32`: a moment that rounds to the last time is not past it.
         #[expect(clippy::cast_possible_truncation, reason = "compared as stored")]
         let past = |end: f64| (moment.time as f32) > end as f32;
         if let Some(end) = facts.animations.get(number).map(|animation| animation.seconds).filter(|&end| past(end)) {
@@ -269,7 +267,7 @@ impl Loading<'_> {
         Ok(pose)
     }
 
-    /// The document at that moment; `None`: it is as the file says.
+    /// Returns the document at that moment; `None` if it is unchanged.
     fn posed(&self, document: &Document, pose: &Pose, budget: &mut Budget) -> Result<Option<Root>, LoadError> {
         if !pose.changes_document() {
             return Ok(None);
@@ -278,14 +276,14 @@ impl Loading<'_> {
         Ok(Some(pose.posed(&document.root, &document.originals)))
     }
 
-    /// The variant of materials that is asked for.
+    /// Index of the requested material variant.
     fn variant(&self, names: &[String]) -> Result<Option<usize>, LoadError> {
         let Some(wish) = &self.options.variant else { return Ok(None) };
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         Ok(Some(choice::choose(&choice::VARIANT, &names, wish, &self.source.path)?))
     }
 
-    /// In a GLB, a first buffer without a uri is the binary chunk, which must be there when it is needed.
+    /// Checks that a GLB has the binary chunk, if its first buffer has no uri and is used.
     fn check_chunk(&mut self, root: &Root) {
         let nowhere = root.buffers.first().is_some_and(|buffer| buffer.uri.is_none() && !meshopt::is_stand_in(buffer));
         if nowhere && root.buffer_views.iter().any(|view| view.buffer.value() == 0) {
@@ -293,16 +291,16 @@ impl Loading<'_> {
         }
     }
 
-    /// Refuses a file whose accessors are larger than memory allows, before any is read.
+    /// Refuses a file with accessors that exceed the memory limit, before any is read.
     fn check_budget(&self, reader: Reader, mut budget: Budget) -> Result<(), LoadError> {
-        // Zeros need no bytes in the file, so that only the budget bounds them.
+        // Accessors of zeros need no bytes in the file, so only the budget bounds them.
         let accessors = reader.root.accessors.iter().enumerate().filter(|(_, a)| a.buffer_view.is_none());
         let zeros = accessors.filter(|(i, _)| reader.decoded.count(*i).is_none()).map(|(_, a)| a.count.0);
         let largest = zeros.max().unwrap_or(0);
         self.take(&mut budget, largest.saturating_mul(64), "an accessor")
     }
 
-    /// Charges what the primitives will take.
+    /// Charges the memory of all primitives.
     fn charge(
         &self,
         reader: Reader,
@@ -317,7 +315,7 @@ impl Loading<'_> {
         self.take(budget, costs.fold(0, u64::saturating_add), "what the meshes hold")
     }
 
-    /// Takes bytes for something, or refuses the file.
+    /// Charges `bytes` for `what`, or refuses the file.
     fn take(&self, budget: &mut Budget, bytes: u64, what: &str) -> Result<(), LoadError> {
         budget.take(bytes, 1).map_err(|over| self.too_large(what, over))
     }
@@ -327,7 +325,7 @@ impl Loading<'_> {
         Diagnostic::over_memory(&self.source.path, "", text).into()
     }
 
-    /// Puts what was read into the scene; points and lines are given back with their places.
+    /// Adds what was read to the scene; returns points and lines with their instances.
     fn assemble(
         &mut self,
         scene: &mut Scene,
@@ -337,7 +335,7 @@ impl Loading<'_> {
         facts: &mut Facts,
     ) -> Result<(Vec<Wires>, Vec<Instance>), LoadError> {
         let mut dropped = faces::Dropped::default();
-        // For each posed mesh, its primitives and where a skin has put them; likewise its points and lines.
+        // For each posed mesh, its primitives with their placement by a skin: first triangles, then points and lines.
         let mut parts: Vec<[Vec<Part>; 2]> = Vec::new();
         let mut wires: Vec<Wires> = Vec::new();
         for primitives in reads {
@@ -392,7 +390,7 @@ impl Loading<'_> {
     }
 }
 
-/// Reads every primitive of every posed mesh, in parallel; the order of results is that of the file.
+/// Reads every primitive of every posed mesh, in parallel; the results keep the order of the file.
 fn read_meshes(
     reader: Reader,
     placed: &Placed,

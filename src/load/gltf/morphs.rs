@@ -1,4 +1,4 @@
-//! What morph targets change that the structs of the document have no place for: colours and texture coordinates.
+//! Changes by morph targets for which the typed document has no fields: colours and texture coordinates.
 
 use super::schema::{list, position};
 use super::tree::{Map, Value};
@@ -7,21 +7,21 @@ use gltf::json::accessor::Accessor;
 use gltf::json::mesh::Semantic;
 use std::collections::HashMap;
 
-/// Such changes, by the numbers of mesh and primitive.
+/// These changes, by the indices of mesh and primitive.
 #[derive(Debug, Default)]
 pub(super) struct Morphs(HashMap<[usize; 2], Vec<Change>>);
 
-/// What is added to an attribute.
+/// Change of an attribute by a morph target.
 #[derive(Clone, Debug)]
 pub(super) struct Change {
-    /// The number of the target.
+    /// Index of the morph target.
     pub(super) target: usize,
     pub(super) attribute: Semantic,
     pub(super) accessor: Index<Accessor>,
 }
 
 impl Morphs {
-    /// Those of a document whose indices are right.
+    /// Collects the changes of a document whose indices are valid.
     pub(super) fn of(root: &Value) -> Self {
         let mut morphs = Self::default();
         for (i, mesh) in list(root, "meshes").iter().enumerate() {
@@ -36,7 +36,7 @@ impl Morphs {
         morphs
     }
 
-    /// Those of a primitive of a mesh, target by target.
+    /// Changes of a primitive, ordered by target.
     pub(super) fn of_primitive(&self, mesh: usize, primitive: usize) -> &[Change] {
         self.0.get(&[mesh, primitive]).map_or(&[], Vec::as_slice)
     }
@@ -49,7 +49,7 @@ fn changes(number: usize, target: &Value) -> impl Iterator<Item = Change> {
     })
 }
 
-/// Colours beyond the first are not shown, changed or not.
+/// Parses an attribute; colour sets after the first are not drawn, changed or not.
 fn attribute(name: &str) -> Option<Semantic> {
     match name.strip_prefix("TEXCOORD_") {
         Some(set) => set.parse().ok().map(Semantic::TexCoords),

@@ -1,4 +1,4 @@
-//! Files that a URI names, also where it does not lead to them: the name is often that of another machine.
+//! Files named by URIs, also where the URI leads nowhere: it is often a path on another machine.
 
 use crate::load::finder::Finder;
 use crate::load::limits::{Budget, OverBudget};
@@ -9,22 +9,21 @@ use std::path::{Path, PathBuf};
 
 /// Reads the files that the URIs of one model name.
 pub(super) struct Reader<'a> {
-    /// The model.
+    /// Path of the model.
     pub file: &'a Path,
     pub resolver: &'a mut Resolver,
-    /// Names that were found nowhere.
+    /// Number of names that were found nowhere.
     pub missed: usize,
 }
 
-/// Why there are no bytes.
+/// Reason why a file was not read.
 pub(super) enum Unread {
     TooLarge(OverBudget),
     Fault(FileFault),
 }
 
 impl Reader<'_> {
-    /// The bytes of the file that `uri`, written at `place`, leads to, or else of one of its name near the model, which
-    /// `warnings` tell.
+    /// Reads the file that `uri`, written at `place`, leads to, or else one of the same name near the model, with a warning.
     pub(super) fn read(
         &mut self,
         uri: &str,
@@ -42,7 +41,7 @@ impl Reader<'_> {
         };
         let Some(path) = self.near(uri, &why) else { return Err(Unread::Fault(why)) };
         if matches!(why, FileFault::Outside { .. }) && !uri.starts_with('/') {
-            // How the file that was named could be read; one on another machine could not.
+            // Names the remedy for reading the named file, which a path on another machine does not have.
             warnings.push(why.diagnose(self.file, place));
         }
         let bytes = self.resolver.read_file_within(&path, budget).map_err(Unread::Fault)?;
@@ -51,8 +50,8 @@ impl Reader<'_> {
         Ok(bytes)
     }
 
-    /// Where a file of that name lies, if one does. What was found and cannot be read is not looked for elsewhere, nor is
-    /// what is on a network.
+    /// Path of a file of that name near the model, if there is one. Files that exist but cannot be read are not looked for
+    /// elsewhere, nor are those on a network.
     fn near(&mut self, uri: &str, why: &FileFault) -> Option<PathBuf> {
         let is_elsewhere =
             matches!(why, FileFault::Scheme(_) | FileFault::Outside { .. } | FileFault::OutsideArchive(_));

@@ -1,4 +1,4 @@
-//! The materials of the primitives that are drawn, and what each primitive is read for.
+//! Materials of the drawn primitives, and the task of reading each primitive.
 
 use super::material;
 use super::mesh::{Job, Needs};
@@ -11,22 +11,22 @@ use crate::scene::Material;
 use gltf::json::Root;
 use gltf::json::mesh as source;
 
-/// Materials in use, and how the file's numbers lead to them.
+/// Materials in use, and their mapping from the file's indices.
 pub(super) struct Palette<'a> {
-    /// The variant of materials that is asked for.
+    /// Index of the requested material variant.
     variant: Option<usize>,
-    /// Whether normals that are missing will be made smooth.
+    /// Whether missing normals will be smoothed.
     smooths: bool,
     pub(super) materials: Vec<Material>,
     needs: Vec<Needs>,
-    /// For each material of the file, and last for the default one, its index here.
+    /// Index into `materials` for each material of the file; the last entry is the default material.
     index: Vec<Option<u32>>,
     pub(super) textures: Textures<'a>,
     morphs: &'a Morphs,
 }
 
 impl<'a> Palette<'a> {
-    /// Converts the materials that drawn primitives name.
+    /// Converts the materials of the drawn primitives.
     pub(super) fn new(
         root: &'a Root,
         morphs: &'a Morphs,
@@ -61,14 +61,14 @@ impl<'a> Palette<'a> {
         palette
     }
 
-    /// The material that a primitive shows; `None` when it is not drawn.
+    /// Material of a primitive; `None` when it is not drawn.
     pub(super) fn material(&self, posed: &PosedMesh, primitive: &source::Primitive) -> Option<u32> {
-        // The default material is the last.
+        // The default material is the last entry.
         let i = variants::material(primitive, self.variant).unwrap_or(self.index.len().checked_sub(1)?);
         self.index.get(i).copied().flatten().filter(|_| posed.drawn)
     }
 
-    /// What to read of a primitive, the `k`th of its mesh.
+    /// Task of reading a primitive, the `k`th of its mesh.
     pub(super) fn job<'j>(
         &'j self,
         posed: &'j PosedMesh,

@@ -1,14 +1,14 @@
-//! Gathers what is wrong with a file, sorted by the table of [`super::codes`].
+//! Collects the faults of a file, sorted by the table of [`super::codes`].
 
 use super::codes::{self, Code, Verdict};
 use crate::load::diagnostic::CUT_OFF;
 use crate::load::{Diagnostic, LoadError, Warnings};
 use std::path::{Path, PathBuf};
 
-/// Faults listed before the rest is only counted.
+/// Most faults that are listed; the rest is only counted.
 const SHOWN: usize = 20;
 
-/// Parts that are left out at most: each is remembered.
+/// Most places of left-out parts that are remembered.
 const LEFT_OUT: usize = 1 << 16;
 
 /// Faults that refuse the file, and warnings.
@@ -17,7 +17,7 @@ pub(super) struct Report {
     file: PathBuf,
     faults: Warnings,
     pub(super) warnings: Warnings,
-    /// Whether parts that can be left out are, where they would refuse the file; and the places of those that are.
+    /// Whether invalid parts that can be left out are, rather than refusing the file; and their places.
     leaves_out: bool,
     left_out: Vec<String>,
 }
@@ -32,27 +32,27 @@ impl Report {
         &self.file
     }
 
-    /// Whether from now on faults in parts that can be left out are warnings, and their places are kept.
+    /// Sets whether faults in parts that can be left out become warnings, with their places recorded.
     pub(super) fn leave_out(&mut self, whether: bool) {
         self.leaves_out = whether;
     }
 
-    /// The places that were kept, in the order of their faults.
+    /// Returns the recorded places, in the order of their faults, and clears them.
     pub(super) fn take_left_out(&mut self) -> Vec<String> {
         std::mem::take(&mut self.left_out)
     }
 
-    /// Whether anything refuses the file.
+    /// Returns whether a fault refuses the file.
     pub(super) fn refuses(&self) -> bool {
         !self.faults.is_empty()
     }
 
-    /// Takes over what refuses the file by another report, but none of its warnings.
+    /// Takes over the faults of another report that refuse the file, without its warnings.
     pub(super) fn take_faults(&mut self, other: Self) {
         self.faults.extend(other.faults);
     }
 
-    /// Files a fault under its code's verdict at `place`.
+    /// Files a fault by the verdict of its code at `place`.
     pub(super) fn add(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>) {
         match code.verdict_at(place.as_ref()) {
             Verdict::Refuse => self.refuse(code, place, text),
@@ -65,7 +65,7 @@ impl Report {
         }
     }
 
-    /// Files a fault that refuses the file whatever the table says of the milder cases of its code.
+    /// Refuses the file, even if the table is milder on the code.
     pub(super) fn refuse(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>) {
         if self.leaves_out && codes::can_be_left_out(place.as_ref()) && self.left_out.len() < LEFT_OUT {
             self.left_out.push(place.as_ref().to_owned());
@@ -74,45 +74,45 @@ impl Report {
         self.refuse_with(code, place, text, code.remedy());
     }
 
-    /// Refuses the file where something else helps than does mostly.
+    /// Refuses the file, with another remedy than the code's.
     pub(super) fn refuse_with(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>, remedy: &str) {
         let fault = Diagnostic::new(code.name(), &self.file, place.as_ref(), text).remedy(remedy);
         let kind = kind(&fault);
         self.faults.push_kind(fault, kind);
     }
 
-    /// Files a fault as a warning, whatever the table says of the graver cases of its code.
+    /// Warns, even if the table is stricter on the code.
     pub(super) fn warn(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>) {
         let why = code.row().why;
         self.warn_with(code, place, text, if code.row().verdict == Verdict::Warn { why } else { "" });
     }
 
-    /// Warns where something else becomes of it than the table says.
+    /// Warns of a fault with another consequence than in the table.
     pub(super) fn warn_with(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>, remedy: &str) {
         let warning = Diagnostic::new(code.name(), &self.file, place.as_ref(), text);
         let kind = kind(&warning);
         self.warnings.push_kind(warning.remedy(remedy), kind);
     }
 
-    /// Files a warning for which the validator has no code.
+    /// Warns of something for which the validator has no code.
     pub(super) fn note(&mut self, code: &'static str, place: impl AsRef<str>, text: impl Into<String>, remedy: &str) {
         let warning = Diagnostic::new(code, &self.file, place.as_ref(), text);
         let kind = kind(&warning);
         self.warnings.push_kind(warning.remedy(remedy), kind);
     }
 
-    /// Files a fault made elsewhere.
+    /// Adds a fault that refuses the file.
     pub(super) fn fault(&mut self, fault: Diagnostic) {
         self.faults.push(fault);
     }
 
-    /// Takes over what another part found.
+    /// Takes over faults and warnings of another report.
     pub(super) fn merge(&mut self, other: Self) {
         self.faults.extend(other.faults);
         self.warnings.extend(other.warnings);
     }
 
-    /// Stops here when anything refuses the file.
+    /// Fails with all faults so far, if any refuses the file.
     pub(super) fn check(&mut self) -> Result<(), LoadError> {
         if self.faults.is_empty() {
             return Ok(());
@@ -131,7 +131,7 @@ impl Report {
     }
 }
 
-/// Whether a warning tells why data that somebody needs is not there.
+/// Returns whether a warning explains missing data.
 fn says_that_data_is_missing(warning: &Diagnostic) -> bool {
     let codes = [
         Code::GlbLengthMismatch,
@@ -142,7 +142,7 @@ fn says_that_data_is_missing(warning: &Diagnostic) -> bool {
     codes.iter().any(|code| code.name() == warning.code)
 }
 
-/// What a message says without its numbers: the same fault of another node, with another value, is of the same kind.
+/// Text of a message without its numbers: the same fault at another node, with another value, has the same kind.
 fn kind(message: &Diagnostic) -> String {
     let mut kind = String::with_capacity(message.place.len() + message.text.len());
     for part in [&message.place, &message.text] {

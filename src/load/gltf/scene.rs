@@ -1,4 +1,4 @@
-//! Which scene of the file is drawn, and what stands where in it.
+//! Choice of the scene, and the objects that its nodes place.
 
 use super::accessor::{Pick, Reader, Unreadable};
 use super::cameras_lights;
@@ -16,26 +16,26 @@ use serde_json::{Map, Value};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// A mesh in one shape: morphed by these weights, posed by this skin.
+/// A mesh in one shape: with these morph weights, posed by this skin.
 #[derive(Clone, Debug)]
 pub(super) struct PosedMesh {
     pub(super) mesh: usize,
-    /// Weights of a node or an animation; `None`: those of the mesh count.
+    /// Morph weights of a node or an animation; `None`: those of the mesh.
     pub(super) weights: Option<Vec<f32>>,
     pub(super) skin: Option<usize>,
-    /// Whether the scene shows it; others are only checked.
+    /// Whether the scene shows the mesh; otherwise it is only checked.
     pub(super) drawn: bool,
 }
 
-/// A posed mesh in its place.
+/// An instance of a posed mesh.
 pub(super) struct Draw {
-    /// The node that shows it.
+    /// The node that has the mesh.
     pub(super) node: usize,
     pub(super) posed: usize,
     pub(super) world: DAffine3,
 }
 
-/// Everything that the nodes of a scene place.
+/// All objects that the nodes of a scene place.
 #[derive(Default)]
 pub(super) struct Placed {
     pub(super) posed: Vec<PosedMesh>,
@@ -44,33 +44,33 @@ pub(super) struct Placed {
     pub(super) lights: Vec<Light>,
 }
 
-/// Names of all scenes.
+/// Returns the names of all scenes.
 pub(super) fn names(root: &Root) -> Vec<String> {
     root.scenes.iter().map(|scene| scene.name.clone().unwrap_or_default()).collect()
 }
 
-/// The scene that is asked for by name or number; without a wish, the default one, or else the first.
+/// Index of the scene requested by name or number; without a request, of the default one, or else the first.
 pub(super) fn choose(root: &Root, wish: Option<&str>, file: &Path) -> Result<usize, Diagnostic> {
     let Some(wish) = wish else { return Ok(root.scene.map_or(0, |scene| scene.value())) };
     let names: Vec<&str> = root.scenes.iter().map(|scene| scene.name.as_deref().unwrap_or_default()).collect();
     choice::choose(&choice::SCENE, &names, wish, file)
 }
 
-/// What is played while a scene is walked.
+/// The animation being played, as far as it matters to the walk.
 #[derive(Clone, Copy)]
 pub(super) struct Played<'a> {
-    /// Whether this is a moment of an animation.
+    /// Whether a moment of an animation is drawn.
     pub(super) moving: bool,
-    /// Whether that switches nodes on and off.
+    /// Whether that animation switches nodes on and off.
     pub(super) switches: bool,
-    /// Weights that it gives to morph targets, by node.
+    /// Morph weights by the animation, by node index.
     pub(super) weights: &'a HashMap<usize, Vec<f32>>,
 }
 
-/// Walks the nodes of a scene; a file without scenes shows all its nodes.
+/// Walks the nodes of a scene; in a file without scenes, all nodes.
 ///
 /// # Errors
-/// When the scene would take more than is left of `budget`.
+/// If the scene would exceed the rest of `budget`.
 pub(super) fn walk(
     reader: Reader,
     graph: &Graph,
@@ -84,7 +84,7 @@ pub(super) fn walk(
         Some(scene) => scene.nodes.iter().map(|node| node.value()).collect(),
         None => graph.roots().collect(),
     };
-    // Nodes, and whether what they hang on is visible.
+    // Nodes, and whether all their ancestors are visible.
     let mut stack: Vec<(usize, bool)> = tops.into_iter().rev().map(|node| (node, true)).collect();
     let mut seen = vec![false; root.nodes.len()];
     let mut walk = Walk { reader, played, placed: Placed::default(), known: HashMap::new(), budget, report };
@@ -96,7 +96,7 @@ pub(super) fn walk(
         let is_shown = is_shown && is_visible(node);
         stack.extend(node.children.iter().flatten().rev().map(|child| (child.value(), is_shown)));
         let world = graph.world.get(i).copied().unwrap_or_default();
-        // What hides a node hides no camera (KHR_node_visibility).
+        // Hidden nodes keep their cameras (KHR_node_visibility).
         let camera = cameras_lights::camera(root, node, world, walk.report);
         walk.placed.cameras.extend(camera);
         walk.light(node, world, is_shown);
@@ -109,22 +109,22 @@ pub(super) fn walk(
     Ok(placed)
 }
 
-/// What makes a posed mesh: mesh, skin, and the bits of weights that are not those of the mesh.
+/// Identity of a posed mesh: mesh, skin, and the bits of weights that differ from those of the mesh.
 type Kind = (usize, Option<usize>, Option<Vec<u32>>);
 
 struct Walk<'a, 'b> {
     reader: Reader<'a>,
     played: Played<'b>,
     placed: Placed,
-    /// Where each posed mesh is in the list.
+    /// Index of each posed mesh in the list.
     known: HashMap<Kind, usize>,
     budget: &'b mut Budget,
     report: &'b mut Report,
 }
 
 impl Walk<'_, '_> {
-    /// Places the light of a node. One that an animation switches off is there and dark: whether the model has lamps of its own
-    /// is the same at all moments.
+    /// Places the light of a node. A light that an animation switches off is kept but dark, so that the model has lights of its
+    /// own at all moments or at none.
     fn light(&mut self, node: &Node, world: DAffine3, is_shown: bool) {
         if !is_shown && !self.played.switches {
             return;
@@ -136,13 +136,13 @@ impl Walk<'_, '_> {
         self.placed.lights.extend(light);
     }
 
-    /// Places the mesh of a node, or its copies.
+    /// Places the instances of a node's mesh.
     fn mesh(&mut self, i: usize, node: &Node, world: DAffine3) -> Result<(), OverBudget> {
         let Some(mesh) = node.mesh.and_then(|mesh| self.reader.root.meshes.get(mesh.value())) else { return Ok(()) };
         let mut places = self.copies(i, node)?;
         places.iter_mut().for_each(|place| *place = world * *place);
         places.retain(|place| node.skin.is_some() || !is_scaled_away(place));
-        // What is hidden at one moment of an animation is shown at another, and the same is read at all of them.
+        // While an animation plays, hidden meshes are read as well, so that all moments read the same data.
         if places.is_empty() && !self.played.moving {
             return Ok(());
         }
@@ -161,7 +161,7 @@ impl Walk<'_, '_> {
         Ok(())
     }
 
-    /// Where a node shows its mesh, in the space of the node.
+    /// Transforms of the copies of a node's mesh, in node space.
     fn copies(&mut self, i: usize, node: &Node) -> Result<Vec<DAffine3>, OverBudget> {
         let Some(attributes) = instancing(node) else { return Ok(vec![DAffine3::IDENTITY]) };
         let copies = Copies::of(attributes);
@@ -170,7 +170,7 @@ impl Walk<'_, '_> {
         Ok(copies.read(self.reader).unwrap_or_else(|why| self.without_copies(i, why)))
     }
 
-    /// Warns of attributes that do not all hold as many copies.
+    /// Warns if the attributes of the copies differ in count.
     fn compare(&mut self, i: usize, copies: &Copies) {
         let counts: Vec<(&str, u64)> = copies.counts(self.reader).collect();
         let all = counts.iter().map(|&(_, count)| count);
@@ -184,7 +184,7 @@ impl Walk<'_, '_> {
         self.report.warn_with(Code::MeshPrimitiveUnequalAccessorCount, place, text, "copies without one are left out");
     }
 
-    /// What is drawn when the places of copies cannot be read.
+    /// Transforms to use when those of the copies cannot be read.
     fn without_copies(&mut self, i: usize, why: Unreadable) -> Vec<DAffine3> {
         match why {
             Unreadable::Unknown => return vec![DAffine3::IDENTITY],
@@ -195,7 +195,7 @@ impl Walk<'_, '_> {
         Vec::new()
     }
 
-    /// The posed mesh that a node shows.
+    /// Index of the posed mesh of a node, which is added if it is new.
     fn posed(&mut self, i: usize, node: &Node, mesh: &Mesh) -> Option<usize> {
         let (index, skin) = (node.mesh?.value(), node.skin.map(|skin| skin.value()));
         let own = self.played.weights.get(&i).or(node.weights.as_ref());
@@ -209,7 +209,7 @@ impl Walk<'_, '_> {
     }
 }
 
-/// The meshes that no node of the scene shows, at rest.
+/// Adds the meshes that no node of the scene shows, at rest.
 fn unused(root: &Root, placed: &mut Placed) {
     let mut shown = vec![false; root.meshes.len()];
     for posed in &placed.posed {
@@ -220,26 +220,26 @@ fn unused(root: &Root, placed: &mut Placed) {
     placed.posed.extend(hidden.map(at_rest));
 }
 
-/// KHR_node_visibility: hidden nodes hide their children, but no cameras.
+/// Returns whether KHR_node_visibility leaves a node visible. Hidden nodes hide their children, but no cameras.
 fn is_visible(node: &Node) -> bool {
     let extension = node.extensions.as_ref().and_then(|e| e.others.get("KHR_node_visibility"));
     extension.and_then(|e| e.get("visible")).and_then(Value::as_bool).unwrap_or(true)
 }
 
-/// Whether the scale is zero on all axes, by which glTF 2.0 (§3.5.3) lets animations hide meshes.
+/// Returns whether all scales are zero, by which glTF 2.0 (§3.5.3) lets animations hide meshes.
 ///
-/// It does not hide what a skin places.
+/// It does not hide skinned meshes, whose joints place them.
 fn is_scaled_away(world: &DAffine3) -> bool {
     world.matrix3 == DMat3::ZERO
 }
 
-/// EXT_mesh_gpu_instancing: the attributes of copies.
+/// Returns the attributes of EXT_mesh_gpu_instancing.
 fn instancing(node: &Node) -> Option<&Map<String, Value>> {
     let extension = node.extensions.as_ref()?.others.get("EXT_mesh_gpu_instancing")?;
     extension.get("attributes")?.as_object()
 }
 
-/// The accessors of EXT_mesh_gpu_instancing.
+/// Accessors of EXT_mesh_gpu_instancing.
 struct Copies {
     translations: Option<Index<Accessor>>,
     rotations: Option<Index<Accessor>>,
@@ -253,19 +253,19 @@ impl Copies {
         Self { translations: index("TRANSLATION"), rotations: index("ROTATION"), scales: index("SCALE") }
     }
 
-    /// How many elements each of them declares.
+    /// Number of elements of each accessor, with its name.
     fn counts(&self, reader: Reader) -> impl Iterator<Item = (&'static str, u64)> {
         let parts = [("TRANSLATION", self.translations), ("ROTATION", self.rotations), ("SCALE", self.scales)];
         parts.into_iter().filter_map(move |(name, index)| Some((name, reader.count(index?))))
     }
 
-    /// Bytes that reading them takes.
+    /// Bytes of memory that reading the copies takes.
     fn bytes(&self, reader: Reader) -> u64 {
         let counts = self.counts(reader).map(|(_, count)| count).fold(0, u64::saturating_add);
         counts.saturating_mul((size_of::<[f32; 4]>() + size_of::<DAffine3>()) as u64)
     }
 
-    /// Where the copies stand in the space of their node.
+    /// Reads the transforms of the copies, in node space.
     fn read(&self, reader: Reader) -> Result<Vec<DAffine3>, Unreadable> {
         let translations = self.translations.map(|i| reader.floats::<3>(i, Pick::All)).transpose()?;
         let rotations = self.rotations.map(|i| reader.floats::<4>(i, Pick::All)).transpose()?;

@@ -1,7 +1,7 @@
 //! Checks the JSON against the glTF 2.0 schema: types, required properties, ranges, lists, and every index.
 //!
-//! The rules are data ([`super::schema_tables`]); this walks them beside the JSON. What the walk has passed can be
-//! turned into typed structs, and no index in it points outside. What properties mean together is not checked here.
+//! The rules are data ([`super::schema_tables`]), and the check walks rules and JSON in parallel. JSON that passes can be
+//! converted to typed structs, and all its indices are in range. Consistency between properties is not checked here.
 
 use super::codes::Code;
 use super::report::Report;
@@ -11,20 +11,20 @@ use crate::load::paths::shorten;
 use std::collections::HashSet;
 use std::fmt::Write as _;
 
-/// The rules for one kind of JSON object.
+/// Rules for one type of JSON object.
 pub(super) struct Object {
     pub(super) name: &'static str,
     pub(super) properties: &'static [Property],
 }
 
-/// A named value in an object.
+/// Rule for one property of an object.
 pub(super) struct Property {
     pub(super) name: &'static str,
     pub(super) kind: Kind,
     pub(super) required: bool,
 }
 
-/// The finite numbers from `min` to `max`; `open` excludes the lower end.
+/// Finite numbers from `min` to `max`; `open` excludes the lower end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Range {
     pub(super) min: f64,
@@ -37,14 +37,14 @@ impl Range {
         (if self.open { number > self.min } else { number >= self.min }) && number <= self.max && number.is_finite()
     }
 
-    /// The number in it that is nearest; of an open one a small one.
+    /// Nearest number in the range; above an excluded lower end, by the smallest normal `f32`.
     pub(super) fn nearest(self, number: f64) -> f64 {
         let least = if self.open { self.min + f64::from(f32::MIN_POSITIVE) } else { self.min };
         number.max(least).min(self.max)
     }
 }
 
-/// What it allows, in words.
+/// The allowed numbers, in words.
 impl std::fmt::Display for Range {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         let Self { min, max, open } = self;
@@ -57,20 +57,20 @@ impl std::fmt::Display for Range {
     }
 }
 
-/// What a value must be.
+/// Allowed values of a property.
 pub(super) enum Kind {
     Any,
     Bool,
     Text,
     Number(Range),
-    /// A whole number in a closed range.
+    /// An integer in a closed range.
     Integer {
         min: u64,
         max: u64,
     },
-    /// The position in a list of the root (`"KHR_lights_punctual"`: in its list of lights).
+    /// An index into a list of the root (`"KHR_lights_punctual"`: into its list of lights).
     Index(&'static str),
-    /// The position in a list near by, which is checked apart.
+    /// An index into a nearby list, which is checked separately.
     AnyIndex,
     OneOf(&'static [u64]),
     Word(&'static [&'static str]),
@@ -81,11 +81,11 @@ pub(super) enum Kind {
         unique: bool,
     },
     Object(&'static Object),
-    /// An object with names of its own.
+    /// An object with arbitrary property names.
     Map(&'static Kind),
 }
 
-/// An extension's object: where it may stand and what is in it.
+/// Rules for an extension: the objects that may carry it, and its properties.
 pub(super) struct Extension {
     pub(super) name: &'static str,
     /// Names of [`Object`]s that may carry it.
@@ -93,12 +93,12 @@ pub(super) struct Extension {
     pub(super) object: &'static Object,
 }
 
-/// What the list of this name holds; nothing where there is none.
+/// Elements of the list of this name; empty if there is none.
 pub(super) fn list<'a>(value: &'a Value<'a>, name: &str) -> &'a [Value<'a>] {
     value.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
-/// Whether it is known what an extension holds.
+/// Returns whether there are rules for an extension.
 pub(super) fn is_known_extension(name: &str) -> bool {
     EXTENSIONS.iter().any(|extension| extension.name == name)
 }
@@ -111,7 +111,7 @@ pub(super) fn check(root: &Value, report: &mut Report) {
     channels(root, report);
 }
 
-/// Channels of animations refer to the samplers beside them.
+/// Checks that animation channels refer to existing samplers of their animation.
 fn channels(root: &Value, report: &mut Report) {
     for (i, animation) in list(root, "animations").iter().enumerate() {
         let samplers = list(animation, "samplers").len() as u64;
@@ -131,7 +131,7 @@ fn strings<'a>(list: Option<&'a Value<'a>>) -> HashSet<&'a str> {
 struct Walk<'a> {
     root: &'a Value<'a>,
     used: HashSet<&'a str>,
-    /// Where the walk is, as a JSON path.
+    /// JSON path of the current value.
     path: String,
     report: &'a mut Report,
 }
@@ -141,7 +141,7 @@ impl<'a> Walk<'a> {
         self.report.add(code, self.path.as_str(), text);
     }
 
-    /// Does something one property or element deeper.
+    /// Visits a value one property or element deeper.
     fn at(&mut self, step: impl std::fmt::Display, visit: impl FnOnce(&mut Self)) {
         let length = self.path.len();
         // Writing to a string cannot fail.
@@ -241,7 +241,7 @@ impl<'a> Walk<'a> {
                 let bounds = if max == u64::MAX { format!("at least {min}") } else { format!("{min} to {max}") };
                 self.fault(Code::ValueNotInRange, format!("{number} where {bounds} is allowed"));
             }
-            // A size below zero has no nearest meaning.
+            // No allowed value is near a negative size.
             (None, Some(number)) if number < 0.0 && number.fract() == 0.0 => {
                 self.report.refuse(Code::ValueNotInRange, self.path.as_str(), format!("{number} is negative"));
             }
@@ -320,7 +320,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// `only 1 mesh is`, `only 3 buffers are`.
+/// `only 1 mesh is`, `only 3 buffers are`: the number of elements in a list, for messages.
 fn counted(count: u64, list: &str) -> String {
     let things = match list {
         "KHR_lights_punctual" => "lights",
@@ -331,25 +331,25 @@ fn counted(count: u64, list: &str) -> String {
     if count == 1 { format!("only 1 {one} is") } else { format!("only {count} {things} are") }
 }
 
-/// What decides whether two elements are the same.
+/// Key by which two elements of a list are equal.
 fn key(value: &Value) -> String {
     whole(value).map_or_else(|| value.to_string(), |n| n.to_string())
 }
 
-/// A whole number, however it is written (`1`, `1.0`, `10e-1`).
+/// A non-negative integer, in any notation (`1`, `1.0`, `10e-1`).
 pub(super) fn whole(value: &impl Tree) -> Option<u64> {
-    /// Above 2⁵³ a double does not say which whole number is meant.
+    /// Above 2⁵³ a double does not represent all integers.
     const LARGEST: f64 = 9_007_199_254_740_992.0;
     let exact = |f: f64| (f.fract() == 0.0 && (0.0..=LARGEST).contains(&f)).then_some(f as u64);
     value.as_u64().or_else(|| value.as_f64().and_then(exact))
 }
 
-/// A place in a list of the document.
+/// An index into a list of the document.
 pub(super) fn position(value: &impl Tree) -> Option<usize> {
     usize::try_from(whole(value)?).ok()
 }
 
-/// A value in a message.
+/// Shortens a value for a message.
 fn show(value: &Value) -> String {
     match value {
         Value::Object(_) => "an object".into(),

@@ -1,4 +1,4 @@
-//! The glTF 2.0 schema and those of its extensions, as tables for [`super::schema`].
+//! Tables of the glTF 2.0 schema and those of its extensions, for [`super::schema`].
 
 use super::schema::{Extension, Kind, Object, Property, Range};
 use Kind::{Any, AnyIndex, Bool, Index, Integer, List, Map, Number, OneOf, Text, Word};
@@ -20,12 +20,12 @@ const fn may(name: &'static str, kind: Kind) -> Property {
     Property { name, kind, required: false }
 }
 
-/// A list of at least one element.
+/// A non-empty list.
 const fn some(of: &'static Kind) -> Kind {
     List { of, min: 1, max: usize::MAX, unique: false }
 }
 
-/// A list of at least one element, each different.
+/// A non-empty list of distinct elements.
 const fn unique(of: &'static Kind) -> Kind {
     List { of, min: 1, max: usize::MAX, unique: true }
 }
@@ -283,7 +283,7 @@ static TEXTURE: Object = Object {
     properties: &[may("sampler", Index("samplers")), may("source", Index("images")), may("name", Text)],
 };
 
-/// Words that an extension adds where the core allows others.
+/// Words that extensions allow in addition to those of the core.
 pub(super) static EXTENSION_WORDS: &[(&str, &str)] = &[
     ("image/avif", "EXT_texture_avif"),
     ("image/ktx2", "KHR_texture_basisu"),
@@ -292,7 +292,7 @@ pub(super) static EXTENSION_WORDS: &[(&str, &str)] = &[
     ("pointer", "KHR_animation_pointer"),
 ];
 
-/// The extensions whose contents are known.
+/// Rules for the supported extensions.
 pub(super) static EXTENSIONS: &[Extension] = &[
     Extension { name: "EXT_mesh_gpu_instancing", on: &["a node"], object: &INSTANCING },
     Extension { name: "EXT_meshopt_compression", on: &["a buffer"], object: &MESHOPT_BUFFER },
@@ -341,7 +341,7 @@ static DRACO: Object = Object {
 
 static MESHOPT_BUFFER: Object = Object { name: "an extension", properties: &[may("fallback", Bool)] };
 
-/// Sizes and words are checked where streams are decoded.
+/// Sizes and modes are checked where streams are decoded.
 static MESHOPT: Object = Object {
     name: "an extension",
     properties: &[
@@ -405,7 +405,7 @@ static DISPERSION: Object = Object { name: "an extension", properties: &[may("di
 static EMISSIVE_STRENGTH: Object =
     Object { name: "an extension", properties: &[may("emissiveStrength", NOT_NEGATIVE)] };
 
-/// At least 1, or 0 for the extension's special case.
+/// At least 1, or 0 as a special case of the extension; the range does not exclude numbers between.
 static IOR: Object = Object { name: "an extension", properties: &[may("ior", NOT_NEGATIVE)] };
 
 static IRIDESCENCE: Object = Object {

@@ -1,7 +1,7 @@
-//! Skinned meshes in the pose of their joints, by linear blend skinning.
+//! Skinned meshes, posed by their joints with linear blend skinning.
 //!
-//! A skinned mesh stands where its joints put it: the node that holds it has no say. The joints stand where the nodes do,
-//! at rest or moved by an animation.
+//! The joints alone place a skinned mesh: the transform of its node is ignored. Joints stand where their nodes do, at rest or
+//! animated.
 
 use super::accessor::{Format, Pick, Reader, Unreadable};
 use super::codes::Code;
@@ -19,15 +19,15 @@ use gltf::json::{Root, Skin as Source};
 use serde_json::Value;
 use std::collections::HashSet;
 
-/// What poses the meshes of a skin.
+/// Pose of the meshes that use a skin.
 pub(super) struct Skin {
-    /// From mesh space to world space, for each joint.
+    /// Transforms from mesh space to world space, for each joint.
     pub(super) matrices: Vec<DMat4>,
-    /// The place that posed positions are relative to, the same for all that has this skin.
+    /// Origin of posed positions, common to all meshes with this skin.
     pub(super) center: DVec3,
 }
 
-/// The skins that these meshes have, by number; `None`: one that cannot be used.
+/// Loads the skins of the document, by index; `None` for unusable ones. `posed` lists the meshes that use them.
 pub(super) fn load(reader: Reader, graph: &Graph, posed: &[PosedMesh], report: &mut Report) -> Vec<Option<Skin>> {
     let root = reader.root;
     let middles = middles(root, posed);
@@ -43,7 +43,7 @@ pub(super) fn load(reader: Reader, graph: &Graph, posed: &[PosedMesh], report: &
         .collect()
 }
 
-/// The middle of what has each skin, before it is posed, by what accessors say of their bounds; zero where they do not.
+/// Centre of the meshes of each skin, before posing, by the declared bounds of positions; zero where there are none.
 fn middles(root: &Root, posed: &[PosedMesh]) -> Vec<DVec3> {
     let corner = |said: &Option<Value>| {
         let numbers = said.as_ref()?.as_array()?.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>()?;
@@ -67,7 +67,7 @@ fn middles(root: &Root, posed: &[PosedMesh]) -> Vec<DVec3> {
     corners.into_iter().map(middle).collect()
 }
 
-/// Least and greatest corner of the box around those of these points that are finite.
+/// Minimum and maximum of the finite points.
 fn around(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     points.filter(|p| p.is_finite()).fold(empty, |(lo, hi), p| (lo.min(p), hi.max(p)))
@@ -83,11 +83,11 @@ fn matrices_of(reader: Reader, graph: &Graph, i: usize, report: &mut Report) -> 
     if !is_bind_matrix(Format::of(accessor)?) {
         return None;
     }
-    // Matrices that nobody wrote are no matrices.
+    // An accessor without data provides no matrices.
     if accessor.buffer_view.is_none() && accessor.sparse.is_none() {
         return Some(joints);
     }
-    // Only what the joints need: many skins may share one long list of matrices.
+    // Reads only one matrix per joint: many skins may share one long list.
     let wanted: Vec<u32> = (0..u32::try_from(joints.len()).ok()?).collect();
     if accessor.count.0 < joints.len() as u64 {
         return None;
@@ -115,7 +115,7 @@ fn matrices_of(reader: Reader, graph: &Graph, i: usize, report: &mut Report) -> 
     Some(joints.iter().zip(&inverse).map(|(joint, m)| *joint * bind(m)).collect())
 }
 
-/// The joints of what a scene shows should stand in that scene.
+/// Warns of skins in a scene whose joints are not in that scene.
 pub(super) fn check_scene(root: &Root, graph: &Graph, scene: usize, draws: &[Draw], report: &mut Report) {
     let Some(scene) = root.scenes.get(scene) else { return };
     let trees: HashSet<usize> = scene.nodes.iter().map(|node| graph.tree(node.value())).collect();
@@ -131,7 +131,7 @@ pub(super) fn check_scene(root: &Root, graph: &Graph, scene: usize, draws: &[Dra
     }
 }
 
-/// The joints of a skin should hang on one node, and `skeleton` should be such a node.
+/// Checks that the joints of a skin have a common root, and that `skeleton` is one.
 fn check_skeleton(root: &Root, graph: &Graph, i: usize, report: &mut Report) {
     let Some(skin) = root.skins.get(i) else { return };
     let Some(span) = graph.span(skin.joints.iter().map(|joint| joint.value())) else { return };
@@ -143,14 +143,14 @@ fn check_skeleton(root: &Root, graph: &Graph, i: usize, report: &mut Report) {
     }
 }
 
-/// Joints and weights of every vertex, any number of sets of four.
+/// Joints and weights of every vertex, in any number of sets of four.
 #[derive(Default)]
 pub(super) struct Influences {
     pub(super) joints: Vec<Vec<[u32; 4]>>,
     pub(super) weights: Vec<Vec<[f32; 4]>>,
 }
 
-/// What was odd about the influences of a mesh.
+/// Faults in the influences of a mesh.
 #[derive(Default)]
 pub(super) struct Oddities {
     pub(super) outside: bool,
@@ -159,14 +159,14 @@ pub(super) struct Oddities {
 }
 
 impl Influences {
-    /// The blend of matrices at a vertex; without any influence, the first joint's.
+    /// Weighted mean of the joint matrices at a vertex; the first joint's matrix if all weights are zero.
     fn blend(&self, vertex: usize, matrices: &[DMat4], odd: &mut Oddities) -> DMat4 {
         let (mut sum, mut total) = (DMat4::ZERO, 0.0);
         for (joints, weights) in self.joints.iter().zip(&self.weights) {
             let (Some(joints), Some(weights)) = (joints.get(vertex), weights.get(vertex)) else { continue };
             for (&joint, &weight) in joints.iter().zip(weights) {
                 odd.negative |= weight < 0.0;
-                // Not a number counts as none.
+                // NaN counts as zero.
                 if !(weight > 0.0 && weight.is_finite()) {
                     continue;
                 }
@@ -179,15 +179,15 @@ impl Influences {
                 }
             }
         }
-        /// Eight 8-bit weights may be off by half a step each.
+        /// Tolerance of the sum: eight 8-bit weights may each be off by half a step.
         const WHOLE: f64 = 0.02;
         odd.unequal |= (total - 1.0).abs() > WHOLE;
         if total > 0.0 { sum * (1.0 / total) } else { matrices.first().copied().unwrap_or(DMat4::IDENTITY) }
     }
 }
 
-/// Puts a mesh into the pose of its joints; its positions are relative to the skin's centre then, so that what several
-/// primitives share is rounded alike.
+/// Poses a mesh by its joints. Its positions become relative to the skin's centre, so that vertices shared by several primitives
+/// are rounded alike.
 pub(super) fn pose(mesh: &mut Mesh, influences: &Influences, Skin { matrices, center }: &Skin) -> Oddities {
     let mut odd = Oddities::default();
     let mut placed = Vec::with_capacity(mesh.positions.len());
@@ -205,7 +205,7 @@ pub(super) fn pose(mesh: &mut Mesh, influences: &Influences, Skin { matrices, ce
             *tangent = direction.extend(if mirrored[vertex] { -tangent.w } else { tangent.w });
         }
     }
-    // Joints that mirror turn faces inside out; glTF wants fronts to stay fronts.
+    // Mirroring joints turn faces inside out; glTF requires front faces to stay front faces.
     for triangle in &mut mesh.triangles {
         let inside_out = triangle.iter().filter(|v| mirrored.get(**v as usize) == Some(&true)).count();
         if inside_out >= 2 {
@@ -241,7 +241,7 @@ mod tests {
         assert!(odd.outside && odd.negative && odd.unequal);
     }
 
-    /// One triangle that faces +z for each of these joints, alone; with tangents along x.
+    /// Poses one triangle per joint, facing +z, with tangents along x.
     fn posed(matrices: &[DMat4]) -> Mesh {
         let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let each = |k: u32| [3 * k, 3 * k + 1, 3 * k + 2];

@@ -1,4 +1,4 @@
-//! Sparse parts of accessors: which elements they replace, found out and checked once for the whole file.
+//! Sparse parts of accessors: the elements that they replace, read and checked once for the whole file.
 
 use super::accessor::{Format, Run, Unreadable, integer};
 use super::buffers::Buffers;
@@ -9,15 +9,15 @@ use gltf::json::accessor::{Accessor, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Root, accessor::sparse::Sparse};
 
-/// For each accessor, what its sparse part replaces.
+/// Replaced elements of each accessor.
 pub(super) struct Replacements(Vec<Result<Vec<Replaced>, Unreadable>>);
 
 /// One replaced element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Replaced {
-    /// Its place in the accessor.
+    /// Index of the element in the accessor.
     pub(super) element: u32,
-    /// Its place in the sparse values.
+    /// Index of its value among the sparse values.
     pub(super) value: u32,
 }
 
@@ -25,7 +25,7 @@ impl Replacements {
     /// Reads the indices of every sparse accessor.
     ///
     /// # Errors
-    /// When the lists would take more than is left of `budget`.
+    /// If the lists would exceed the rest of `budget`.
     pub(super) fn load(
         root: &Root,
         buffers: &Buffers,
@@ -44,7 +44,7 @@ impl Replacements {
         Ok(Self(all))
     }
 
-    /// The replaced elements of an accessor, ascending, each once.
+    /// Replaced elements of an accessor, ascending and distinct.
     pub(super) fn of(&self, accessor: usize) -> Result<&[Replaced], Unreadable> {
         match self.0.get(accessor) {
             Some(Ok(list)) => Ok(list),
@@ -81,7 +81,7 @@ fn read(
     if let Some(at) = elements.windows(2).position(|pair| pair[0] >= pair[1]) {
         let text = format!("index {} at position {} follows {}", elements[at + 1], at + 1, elements[at]);
         report.add(Code::AccessorSparseIndicesNonIncreasing, place, text);
-        // The last of several values for one element counts, and comes first here.
+        // The last of several values for an element counts, and is sorted first.
         replaced.sort_unstable_by_key(|r| (r.element, std::cmp::Reverse(r.value)));
         replaced.dedup_by_key(|r| r.element);
     }

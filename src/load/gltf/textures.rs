@@ -1,4 +1,4 @@
-//! Texture slots of materials -> textures of the scene, each image once.
+//! Texture slots of materials -> textures of the scene, without duplicates.
 
 use super::images::image_of;
 use crate::math::Vec2;
@@ -10,30 +10,30 @@ use gltf::json::{Index, Root};
 use std::collections::{BTreeSet, HashMap};
 use std::hash::Hash;
 
-/// Collects the textures that materials show.
+/// Collects the textures of materials.
 pub(super) struct Textures<'a> {
     root: &'a Root,
     /// Textures of the scene; `bitmap` is an index into `images`.
     pub(super) list: Vec<Texture>,
-    /// What the bitmaps are made of, in their order.
+    /// Sources of the bitmaps, in their order.
     pub(super) pictures: Vec<Picture>,
-    /// Textures of the file that were asked for and name no image.
+    /// Requested textures of the file that have no image.
     pub(super) without_image: BTreeSet<usize>,
-    /// Where each is in its list.
+    /// Index of each texture and picture in its list.
     known_textures: HashMap<Texture, u32>,
     known_pictures: HashMap<Picture, u32>,
 }
 
-/// What a bitmap is made of: an image of the file, whose alpha may be gloss.
+/// Source of a bitmap: an image of the file, whose alpha channel may be glossiness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Picture {
     pub(super) image: usize,
-    /// Where its alpha is a part of the material's gloss and becomes roughness: the bits of that gloss.
+    /// For a roughness map made from an alpha channel of glossiness: the bits of the glossiness factor.
     gloss: Option<u32>,
 }
 
 impl Picture {
-    /// Gloss where alpha is 1, if the bitmap holds roughness.
+    /// Glossiness factor, if the bitmap is a roughness map.
     pub(super) fn gloss(self) -> Option<f32> {
         self.gloss.map(f32::from_bits)
     }
@@ -46,7 +46,7 @@ impl<'a> Textures<'a> {
         Self { root, list, pictures, without_image, known_textures, known_pictures }
     }
 
-    /// The texture of a slot; `None` when it names no image.
+    /// Texture of a slot; `None` when it has no image.
     pub(super) fn of(
         &mut self,
         index: Index<texture::Texture>,
@@ -76,12 +76,12 @@ impl<'a> Textures<'a> {
         Some(TextureRef { texture, uv_set, transform: transform.map(transform_of).unwrap_or_default() })
     }
 
-    /// The texture of a plain slot.
+    /// Texture of a plain slot.
     pub(super) fn info(&mut self, info: Option<&texture::Info>) -> Option<TextureRef> {
         self.info_shown(info?, None)
     }
 
-    /// The roughness that the alpha of a plain slot says, where it is gloss, a part of `gloss`.
+    /// Roughness map from a plain slot, whose alpha channel times the factor `gloss` is the glossiness.
     pub(super) fn roughness(&mut self, info: Option<&texture::Info>, gloss: f32) -> Option<TextureRef> {
         self.info_shown(info?, Some(gloss.to_bits()))
     }
@@ -92,16 +92,16 @@ impl<'a> Textures<'a> {
     }
 }
 
-/// The place of a value in a list, at whose end a new one goes.
+/// Index of a value in a list, to which new values are appended.
 fn number_of<T: Clone + Eq + Hash>(value: T, list: &mut Vec<T>, known: &mut HashMap<T, u32>) -> u32 {
     *known.entry(value).or_insert_with_key(|value| {
         list.push(value.clone());
-        // A file would have to be larger than any limit to name so many.
+        // A file with more entries would exceed every size limit.
         u32::try_from(list.len() - 1).unwrap_or(u32::MAX)
     })
 }
 
-/// KHR_texture_transform as one of ours; numbers that are not finite change nothing.
+/// Converts KHR_texture_transform; numbers that are not finite count as the identity.
 pub(super) fn transform_of(transform: &TextureTransform) -> UvTransform {
     let finite = |v: Vec2, otherwise: Vec2| if v.is_finite() { v } else { otherwise };
     UvTransform {
@@ -135,7 +135,7 @@ fn sampler_of(sampler: &texture::Sampler) -> Sampler {
     Sampler { wrap_u: wrap(sampler.wrap_s), wrap_v: wrap(sampler.wrap_t), magnify, minify, mipmaps }
 }
 
-/// Keeps only textures whose image could be decoded, and points materials at what is left.
+/// Drops textures whose image could not be decoded, and renumbers the others in the materials.
 pub(super) fn keep_decoded(
     materials: &mut [Material],
     textures: Vec<Texture>,
@@ -159,7 +159,7 @@ pub(super) fn keep_decoded(
     (kept, bitmaps.into_iter().flatten().collect())
 }
 
-/// Gives a material whose roughness was in a map of gloss that is lost the roughness that is left when gloss is even.
+/// Replaces the roughness of a material whose glossiness map is lost by that of the glossiness factor alone.
 fn without_lost_gloss(material: &mut Material, textures: &[Texture], pictures: &[Picture], bitmaps: &[Option<Bitmap>]) {
     let Reflection::MetalRough(surface) = &mut material.reflection else { return };
     let map = surface.metal_rough_map.as_ref();

@@ -1,6 +1,6 @@
-//! JSON as a tree of values whose texts are parts of the file's, wherever nothing is escaped in them.
+//! JSON as a tree of values whose strings borrow from the text of the file, unless they contain escapes.
 //!
-//! A big document says the same names again and again: here they are neither copied nor hashed.
+//! Large documents repeat the same names: here they are neither copied nor hashed.
 
 use serde::de::value::{BorrowedStrDeserializer, MapDeserializer, SeqDeserializer, StringDeserializer};
 use serde::de::{Deserialize, Deserializer, Error as _, IntoDeserializer, MapAccess, SeqAccess, Unexpected, Visitor};
@@ -8,7 +8,7 @@ use serde_json::{Error, Number};
 use std::borrow::Cow;
 use std::fmt;
 
-/// A value of JSON.
+/// A JSON value.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value<'a> {
     Null,
@@ -19,11 +19,11 @@ pub(super) enum Value<'a> {
     Object(Map<'a>),
 }
 
-/// The members of an object, each name once: few in the order of the file, many in the order of their names.
+/// Members of an object with unique names: few in the order of the file, many sorted by name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Map<'a>(Vec<(Cow<'a, str>, Value<'a>)>);
 
-/// What the trees of this module and those of the `serde_json` crate, which typed documents hold, have in common.
+/// Common interface of the trees of this module and of the `serde_json` crate, which typed documents contain.
 pub(super) trait Tree: Sized {
     fn get(&self, name: &str) -> Option<&Self>;
     fn as_array(&self) -> Option<&Vec<Self>>;
@@ -32,7 +32,7 @@ pub(super) trait Tree: Sized {
 }
 
 impl<'a> Value<'a> {
-    /// The member of an object.
+    /// Member of an object.
     pub(super) fn get(&self, name: &str) -> Option<&Self> {
         self.as_object()?.get(name)
     }
@@ -41,7 +41,7 @@ impl<'a> Value<'a> {
         self.as_object_mut()?.get_mut(name)
     }
 
-    /// The element of a list.
+    /// Element of a list.
     pub(super) fn element(&self, index: usize) -> Option<&Self> {
         self.as_array()?.get(index)
     }
@@ -50,7 +50,7 @@ impl<'a> Value<'a> {
         self.as_array_mut()?.get_mut(index)
     }
 
-    /// What the steps of a path, names and indices without escapes between slashes, lead to.
+    /// Value at a path: names and indices without escapes, each after a slash.
     pub(super) fn pointer(&self, path: &str) -> Option<&Self> {
         path.split('/').skip(1).try_fold(self, |value, step| match value {
             Self::Array(list) => list.get(step.parse::<usize>().ok()?),
@@ -94,7 +94,7 @@ impl<'a> Value<'a> {
         matches!(self, Self::Object(_))
     }
 
-    /// A copy that borrows nothing.
+    /// Returns an owned copy.
     pub(super) fn owned(&self) -> serde_json::Value {
         match self {
             Self::Null => serde_json::Value::Null,
@@ -108,7 +108,7 @@ impl<'a> Value<'a> {
 }
 
 impl<'a> Map<'a> {
-    /// From so many members on they are sorted: what looks for every name of a large object would take squared time.
+    /// Count from which members are sorted: looking up every name of a large unsorted object would take quadratic time.
     const MANY: usize = 17;
 
     pub(super) fn is_empty(&self) -> bool {
@@ -127,7 +127,7 @@ impl<'a> Map<'a> {
         self.find(name).is_ok()
     }
 
-    /// Puts a value under a name, in the place of the one that is there.
+    /// Inserts a value, replacing that of the same name.
     pub(super) fn insert(&mut self, name: impl Into<Cow<'a, str>>, value: Value<'a>) {
         let name = name.into();
         match self.find(&name) {
@@ -139,7 +139,7 @@ impl<'a> Map<'a> {
         }
     }
 
-    /// Puts a value under a name that has none.
+    /// Inserts a value unless the name exists.
     pub(super) fn insert_missing(&mut self, name: &'static str, value: impl FnOnce() -> Value<'a>) {
         if !self.contains_key(name) {
             self.insert(name, value());
@@ -164,7 +164,7 @@ impl<'a> Map<'a> {
         self.0.iter_mut().map(|(name, value)| (&**name, value))
     }
 
-    /// Where a name stands, or where it would.
+    /// Index of a name, or else the index to insert it at.
     fn find(&self, name: &str) -> Result<usize, usize> {
         if self.0.len() >= Self::MANY {
             return self.0.binary_search_by(|(member, _)| member.as_ref().cmp(name));
@@ -172,7 +172,7 @@ impl<'a> Map<'a> {
         self.0.iter().position(|(member, _)| member == name).ok_or(self.0.len())
     }
 
-    /// Sorts the members; of those with one name the last is kept.
+    /// Sorts the members; of several with one name the last is kept.
     fn sort(&mut self) {
         self.0.sort_by(|(a, _), (b, _)| a.cmp(b));
         self.0.dedup_by(|later, kept| {
@@ -199,7 +199,7 @@ impl From<u64> for Value<'_> {
     }
 }
 
-/// What is not finite is no number of JSON.
+/// Numbers that are not finite become null, as JSON has none.
 impl From<f64> for Value<'_> {
     fn from(number: f64) -> Self {
         Number::from_f64(number).map_or(Self::Null, Self::Number)
@@ -255,7 +255,7 @@ macro_rules! tree {
 
 tree!(Value<'_>, serde_json::Value);
 
-/// Builds values of what a parser finds.
+/// Builds values from the output of a parser.
 struct Builder;
 
 impl<'de> Deserialize<'de> for Value<'de> {
@@ -323,7 +323,7 @@ impl<'de> Visitor<'de> for Builder {
     }
 }
 
-/// The name of a member.
+/// Name of a member.
 struct Name<'a>(Cow<'a, str>);
 
 impl<'de> Deserialize<'de> for Name<'de> {
@@ -335,7 +335,7 @@ impl<'de> Deserialize<'de> for Name<'de> {
     }
 }
 
-/// Values are what typed documents are made of.
+/// Lets typed documents be deserialised from values.
 impl<'de> Deserializer<'de> for Value<'de> {
     type Error = Error;
 
@@ -367,7 +367,7 @@ impl<'de> Deserializer<'de> for Value<'de> {
         visitor.visit_newtype_struct(self)
     }
 
-    /// Only of names: no enum of the documents holds more.
+    /// Enums are names only: no enum of the documents carries data.
     fn deserialize_enum<V: Visitor<'de>>(
         self,
         _: &'static str,

@@ -1,11 +1,11 @@
-//! Accessors and buffer views that are used for two things at once: a sign that an index of the file is wrong.
+//! Accessors and buffer views with two different uses: a sign of a wrong index in the file.
 
 use super::codes::Code;
 use super::report::Report;
 use super::schema::{list, position};
 use super::tree::{Map, Value};
 
-/// What data is used for.
+/// Use of data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Use {
     Vertices,
@@ -28,8 +28,8 @@ impl Use {
         }
     }
 
-    /// Whether two should not share a view. Matrices and animation stand in views of their own or in whatever is
-    /// there; nothing goes wrong by that.
+    /// Returns whether two uses should not share a view. Matrices and animations often share views with other data, and do so
+    /// without harm.
     fn clashes(self, other: Self) -> bool {
         let pair = [self, other];
         self != other
@@ -64,7 +64,7 @@ pub(super) fn check(root: &Value, report: &mut Report) {
 
 struct Check<'a> {
     root: &'a Value<'a>,
-    /// What each was used for first.
+    /// First use of each accessor and view.
     accessors: Vec<Option<Use>>,
     views: Vec<Option<Use>>,
     report: &'a mut Report,
@@ -86,7 +86,7 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Notes a use of an accessor and of its view; tells of the accessor alone where both are used twice.
+    /// Records a use of an accessor and of its view; if both have two uses, only the accessor is reported.
     fn accessor(&mut self, index: Option<&Value>, here: Use, place: impl Fn() -> String) {
         let Some(index) = index.and_then(position) else { return };
         let Some(accessor) = list(self.root, "accessors").get(index) else { return };
@@ -117,7 +117,7 @@ mod tests {
     use serde_json::json;
     use std::path::Path;
 
-    /// What is told of a file with three accessors, of which 1 and 2 share a view.
+    /// Warnings about a file with three accessors, of which 1 and 2 share a view.
     fn told(parts: serde_json::Value) -> Vec<String> {
         let mut root = json!({
             "accessors": [{"bufferView": 0}, {"bufferView": 1}, {"bufferView": 1}], "bufferViews": [{}, {}, {}]});

@@ -1,6 +1,6 @@
-//! KHR_materials_variants: the materials of the variant that is asked for.
+//! KHR_materials_variants: the materials of the requested variant.
 //!
-//! A primitive shows its own material where nobody asks for a variant, and in a variant that says nothing of it.
+//! A primitive keeps its own material if no variant is requested, or if the variant does not map it.
 
 use super::codes::Code;
 use super::report::Report;
@@ -11,20 +11,20 @@ use gltf::json::mesh::Primitive;
 
 const NAME: &str = "KHR_materials_variants";
 
-/// Names of all variants of a document that has passed the schema check.
+/// Returns the names of all variants of a document that has passed the schema check.
 pub(super) fn names(root: &Value) -> Vec<String> {
     let list = root.pointer("/extensions/KHR_materials_variants/variants").and_then(Value::as_array);
     let name = |variant: &Value| variant.get("name").and_then(Value::as_str).unwrap_or_default().to_owned();
     list.into_iter().flatten().map(name).collect()
 }
 
-/// The material of the file that a primitive shows in a variant; `None`: the default one.
+/// Index of a primitive's material in a variant; `None`: the default material.
 pub(super) fn material(primitive: &Primitive, variant: Option<usize>) -> Option<usize> {
     let mapped = variant.and_then(|variant| mapped(extension(primitive), variant).next());
     mapped.map(|(_, material)| material).or(primitive.material.map(|material| material.value()))
 }
 
-/// The material that a primitive, as it stands in the JSON, shows in a variant.
+/// Like [`material`], for a primitive in JSON.
 pub(super) fn material_in(primitive: &Value, variant: Option<usize>) -> Option<usize> {
     let extension = primitive.get("extensions").and_then(|e| e.get(NAME));
     let mapped = variant.and_then(|variant| mapped(extension, variant).next());
@@ -35,7 +35,7 @@ fn extension(primitive: &Primitive) -> Option<&serde_json::Value> {
     primitive.extensions.as_ref()?.others.get(NAME)
 }
 
-/// Warns where two mappings of a primitive speak of the variant.
+/// Warns of primitives with two mappings for the variant.
 pub(super) fn check(root: &Root, variant: usize, report: &mut Report) {
     for (i, mesh) in root.meshes.iter().enumerate() {
         for (k, primitive) in mesh.primitives.iter().enumerate() {
@@ -49,7 +49,7 @@ pub(super) fn check(root: &Root, variant: usize, report: &mut Report) {
     }
 }
 
-/// The mappings of a primitive that speak of a variant: where each stands, and its material.
+/// Mappings of a primitive that contain a variant: index and material of each.
 fn mapped<T: Tree>(extension: Option<&T>, variant: usize) -> impl Iterator<Item = (usize, usize)> {
     let mappings = extension.and_then(|e| e.get("mappings")).and_then(T::as_array).into_iter().flatten();
     mappings.enumerate().filter_map(move |(i, mapping)| {

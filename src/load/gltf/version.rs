@@ -1,10 +1,10 @@
-//! Which glTF this is: versions other than 2 are named before anything else is looked at.
+//! Version of glTF: versions other than 2 are reported before anything else is checked.
 
 use super::codes::Code;
 use super::report::Report;
 use super::tree::Value;
 
-/// Checks `asset.version` and `asset.minVersion`; false when the rest need not be looked at.
+/// Checks `asset.version` and `asset.minVersion`; returns whether the rest should be checked.
 pub(super) fn check(root: &Value, report: &mut Report) -> bool {
     if !root.is_object() {
         report.add(Code::TypeMismatch, "", "the JSON is not an object; this is no glTF file");
@@ -13,7 +13,7 @@ pub(super) fn check(root: &Value, report: &mut Report) -> bool {
     let Some(version) = root.pointer("/asset/version") else { return !is_version_one(root, report) };
     let Some(version) = version.as_str() else { return true };
     match numbers(version) {
-        // The files of glTF 1.0's time were as free with this as with the rest.
+        // Files from the time of glTF 1.0 write the version as loosely as the rest.
         None if version.starts_with("1.") || version == "1" => one(version, Code::PatternMismatch, report),
         None if version == "2" || version.starts_with("2.0.") => {
             let text = format!("version '{}' is not of the form 2.0", crate::load::paths::shorten(version));
@@ -44,7 +44,7 @@ pub(super) fn check(root: &Value, report: &mut Report) -> bool {
     }
 }
 
-/// Checks `minVersion`; false when it asks for more than there is.
+/// Checks `minVersion`; returns whether it is supported.
 fn minimum(root: &Value, version: (u32, u32), report: &mut Report) -> bool {
     let Some(text) = root.pointer("/asset/minVersion").and_then(Value::as_str) else { return true };
     let Some(minimum) = numbers(text) else {
@@ -73,7 +73,7 @@ fn one(version: &str, code: Code, report: &mut Report) -> bool {
     false
 }
 
-/// A file without a version that has what only glTF 1.0 had.
+/// Reports a file without a version that has features of glTF 1.0; returns whether it has.
 fn is_version_one(root: &Value, report: &mut Report) -> bool {
     let maps = ["buffers", "bufferViews", "accessors", "meshes", "nodes", "scenes", "techniques", "shaders"];
     let old = maps.iter().any(|name| root.get(name).is_some_and(Value::is_object));
@@ -83,7 +83,7 @@ fn is_version_one(root: &Value, report: &mut Report) -> bool {
     old
 }
 
-/// `2.0` as (2, 0).
+/// Parses `2.0` as (2, 0).
 fn numbers(version: &str) -> Option<(u32, u32)> {
     let digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit()).then(|| s.parse().ok()).flatten();
     let (major, minor) = version.split_once('.')?;

@@ -1,32 +1,32 @@
-//! What a document takes in memory, found out before the memory is taken.
+//! Memory that a document takes, estimated before it is allocated.
 //!
-//! A value of JSON may be one digit and a comma in the file, and takes a hundred bytes as a parsed value; a node or a
-//! material takes up to a thousand as a typed struct, even an empty one.
+//! A JSON value may be one digit and a comma in the file, and takes a hundred bytes once parsed; a node or a material takes up
+//! to a thousand as a typed struct, even if empty.
 
 use super::tree::Value;
 use gltf::json::{self, accessor, buffer, mesh, scene, texture};
 use std::borrow::Cow;
 
-/// Deepest nesting that the parser reads.
+/// Deepest nesting that the parser supports.
 pub(super) const DEEPEST: usize = 127;
 
-/// What a JSON text holds, counted without parsing it. Text that is no JSON gives some counts as well.
+/// Contents of a JSON text, counted without parsing. Text that is not JSON gives some counts as well.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Weight {
     lists: u64,
     objects: u64,
-    /// Values at most: what stands between commas, and what each list or object holds.
+    /// Upper bound of the number of values: one per comma, and one in each list or object.
     values: u64,
-    /// Values with a name.
+    /// Number of values with a name.
     members: u64,
     /// Bytes in strings: those with escapes are copied.
     text: u64,
-    /// Containers within containers.
+    /// Deepest nesting of lists and objects.
     pub(super) depth: usize,
 }
 
 impl Weight {
-    /// Counts the parts of a JSON text.
+    /// Counts the contents of a JSON text.
     pub(super) fn of(json: &[u8]) -> Self {
         let mut weight = Self { values: 1, ..Self::default() };
         let (mut depth, mut quoted, mut escaped) = (0usize, false, false);
@@ -54,9 +54,9 @@ impl Weight {
         weight
     }
 
-    /// Bytes that the parsed values take at most.
+    /// Upper bound of the bytes of the parsed values.
     ///
-    /// Lists grow by doubling and start with four places, and so do objects, whose members have names beside their values.
+    /// Lists grow by doubling from four slots, and so do objects, whose members have a name beside the value.
     pub(super) fn bytes(&self) -> u64 {
         const VALUE: u64 = size_of::<Value>() as u64;
         const NAME: u64 = size_of::<Cow<str>>() as u64;
@@ -70,11 +70,11 @@ impl Weight {
     }
 }
 
-/// Bytes that the typed document takes, and what is noted of each of its parts.
+/// Bytes of the typed document, with the data that loading keeps for each part.
 pub(super) fn typed(root: &Value) -> u64 {
-    /// Parents, places and numbers of nodes; ways to accessors; reports of primitives.
+    /// Parents, transforms and numbers of nodes; locations of accessors; reports of primitives.
     const NOTES: usize = 512;
-    /// The tree that the attributes of a primitive are kept in.
+    /// The tree that holds the attributes of a primitive.
     const ATTRIBUTES: usize = 1024;
     let list = |value: &Value, name: &str| value.get(name).and_then(Value::as_array).map_or(0, Vec::len);
     let sizes = [
@@ -103,7 +103,7 @@ pub(super) fn typed(root: &Value) -> u64 {
 mod tests {
     use super::*;
 
-    /// Bytes that a value takes besides its own place, by what can be known of it.
+    /// Lower bound of the heap bytes of a value.
     fn held(value: &Value) -> usize {
         match value {
             Value::Array(list) => list.capacity() * size_of::<Value>() + list.iter().map(held).sum::<usize>(),

@@ -1,4 +1,4 @@
-//! Animations at a moment: what moves, what the keys of each kind give, and what broken ones cost.
+//! Animations at a moment: the affected properties, each interpolation, and the cost of broken ones.
 
 use super::*;
 use crate::load::{AnimationFacts, Moment};
@@ -6,7 +6,7 @@ use crate::load::{AnimationFacts, Moment};
 const SHORT: u32 = 5122;
 const BYTE: u32 = 5120;
 
-/// One channel on node 0: where its keys are.
+/// A channel on node 0, with the accessors of its keys.
 struct Keys<'a> {
     path: &'a str,
     interpolation: &'a str,
@@ -41,7 +41,7 @@ fn at(file: &Builder, time: f64) -> Loaded {
     load_bytes(Path::new("a.gltf"), file.gltf(), &options(None, time)).unwrap()
 }
 
-/// Where a point of node 0 is.
+/// World position of a point of node 0.
 fn point(loaded: &Loaded, p: DVec3) -> DVec3 {
     loaded.scene.instances[0].world_from_object.transform_point3(p)
 }
@@ -50,7 +50,7 @@ fn assert_close(found: DVec3, expected: [f64; 3]) {
     assert!((found - DVec3::from(expected)).length() < 1e-6, "{found} where {expected:?} should be");
 }
 
-/// The warnings in full.
+/// All warnings as text, except those about missing bounds of positions.
 fn told(loaded: &Loaded) -> Vec<String> {
     let all = loaded.warnings.iter().filter(|w| w.code != "gltf-mesh-primitive-position-accessor-without-bounds");
     all.map(ToString::to_string).collect()
@@ -84,7 +84,8 @@ fn a_time_past_the_end_is_told_with_the_length_unless_rounding_put_it_there() {
 
 #[test]
 fn a_spline_has_tangents_around_each_value() {
-    // Keys 2 s apart: into, value, out; the middle is half of both values and a quarter of the tangents' difference.
+    // Keys 2 s apart, each as in-tangent, value, out-tangent; the middle is half of both values plus a quarter of the difference
+    // of the inner tangents.
     let values = [[9., 9., 9.], [1., 0., 0.], [4., 2., 0.], [-2., 0., 0.], [3., 0., 0.], [9., 9., 9.]].concat();
     let file = moving("translation", "CUBICSPLINE", &[0., 2.], "VEC3", &values);
     assert_close(point(&at(&file, 1.0), DVec3::ZERO), [0.5 + 1.5 + 0.25 * 6.0, 0.25 * 2.0, 0.0]);
@@ -105,7 +106,7 @@ fn rotation_and_scale_of_two_channels_meet_in_one_node() {
         ],
     );
     file.root["nodes"][0]["translation"] = json!([0, 0, 5]);
-    // Half way: twice as long and turned by 45°.
+    // Half way: twice as long and rotated by 45°.
     assert_close(point(&at(&file, 0.5), DVec3::X), [2f64.sqrt(), 2f64.sqrt(), 5.0]);
     assert_close(point(&at(&file, 1.0), DVec3::X), [0.0, 3.0, 5.0]);
 }
@@ -126,7 +127,7 @@ fn rotations_may_be_normalised_integers() {
     }
 }
 
-/// A triangle with two morph targets, at rest at weights of 0 and 0.
+/// A triangle with two morph targets, whose weights at rest are 0.
 fn morphing(values: &[f32]) -> Builder {
     let mut file = Builder::new();
     let positions = file.triangle();

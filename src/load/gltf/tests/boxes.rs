@@ -1,8 +1,8 @@
-//! A box with every attribute that a vertex of a picture has, plain, to be compared with compressed ones.
+//! A plain box with every vertex attribute that matters to rendering, to compare with compressed ones.
 
 use super::*;
 
-/// The corners of the six sides, and what is at each.
+/// Vertices of the six sides, with their attributes.
 pub(super) struct Plain {
     pub(super) positions: Vec<[f32; 3]>,
     pub(super) normals: Vec<[f32; 3]>,
@@ -12,7 +12,7 @@ pub(super) struct Plain {
     pub(super) indices: Vec<u16>,
 }
 
-/// A corner of a triangle, in steps that are coarser than what compression changes.
+/// A triangle corner, in steps coarser than the loss of compression.
 type Corner = [i32; 12];
 
 impl Plain {
@@ -52,7 +52,7 @@ impl Plain {
         self.indices.extend(corners.map(|corner| first + corner));
     }
 
-    /// The file as it is without compression.
+    /// The file without compression.
     pub(super) fn file(&self) -> Builder {
         let mut file = Builder::new();
         let indices = file.shorts(&self.indices);
@@ -73,7 +73,7 @@ pub(super) fn textured(file: &mut Builder) {
     file.set("materials", json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]));
 }
 
-/// The triangles of a scene's only mesh in an order that does not depend on the file's.
+/// Triangles of the scene's only mesh, in an order that does not depend on the file's.
 pub(super) fn triangles(loaded: &Loaded) -> Vec<[Corner; 3]> {
     let [mesh] = &loaded.scene.meshes[..] else { panic!("{} meshes", loaded.scene.meshes.len()) };
     let corner = |v: u32| {
@@ -93,7 +93,7 @@ pub(super) fn triangles(loaded: &Loaded) -> Vec<[Corner; 3]> {
     triangles
 }
 
-/// Loads a file that may be damaged: into a scene, or into few lines.
+/// Loads a file that may be damaged; returns whether it gives a scene, and not a few faults.
 pub(super) fn survives(bytes: &[u8], what: &str) -> bool {
     let options = LoadOptions { limits: Limits { memory: 1 << 26, ..Limits::default() }, ..LoadOptions::default() };
     match load_bytes(Path::new("a.gltf"), bytes.to_vec(), &options) {

@@ -7,19 +7,19 @@ use gltf::json::accessor::ComponentType;
 
 const NAME: &str = "KHR_draco_mesh_compression";
 
-/// A walk over the triangles, everything quantised.
+/// An edgebreaker traversal, all attributes quantised.
 const WALK: &str = "RFJBQ08CAgEBAAAACAwECwAAA19LFQEBEP8CNUFVBIqspEZVBIqspEZVBIqspEYFAAAAAwEA/wAAAQEAAgEAAQICBAEKAQEEAgQACQEBAAkDAA0C\
     AQMJAgELAgEBCQMADAMBAQEBAgMBKgEIAQ4HgM533eimSgAAAAD/AAAAAQEBAQMEqSoBBK0GrQoTdKDsSXsS2s39oPhoe/zdh/artQAAAAADAAAA\
     AQEBAAMDASABIAMAUEOVAhGoAAAAAAD/DwAAAAAAvwAAAL8AAAC/AACAPwwFAQEBAgMBLK0KVQkKgNjWhaDjq1DMgAwAAABAA4D7ZAAAAAD/AwAA\
     AAAAAAAAAAAAAIA/CgYDAQEBAQFAAQD/AAAAfwAAAP8CoUEI";
 
-/// The same, as small as it gets, with metadata.
+/// The same at the strongest compression, with metadata.
 const SMALL: &str = "RFJBQ08CAgEBAIAAARFxdWFudGl6YXRpb25fYml0cwQMAAAAAAAIDAQLAAADX0sVAQEQ/wI1QVUEiqykRlUEiqykRlUEiqykRgUAAAADAQD/AAEB\
     AQACAQABAgIEAQoBAQQCBAAJAQEACQMADQIBAwkCAQsCAQEJAwAMAwEBAQEEAwEqAQgBDgeAznfd6KZKAAAAAP8AAAABAQEBBQSpKgEErQatChN0\
     oOxJexLazf2g+Gh7/N2H9qu1AAAAAAMAAAABAQEAAwMBMAEQAwAolpUCEAAAAAAA/w8AAAAAAL8AAAC/AAAAvwAAgD8MBQEBAQQDASytClUJCoDY\
     1oWg46tQzIAMAAAAQAOA+2QAAAAA/wMAAAAAAAAAAAAAAACAPwoGAwEBAwEBQAEA/wAAAH8AAAD/AqFBCA==";
 
-/// The order of triangles and vertices kept, normals and texture coordinates as they are.
+/// The order of triangles and vertices kept, normals and texture coordinates not quantised.
 const ROW: &str = "RFJBQ08CAgEAAAAMGAEAAgEAAwIEBQYEBgcICgkICwoMDQ4MDg8QEhEQExIUFRYUFhcBBQICBAEKAwkCAQsBCQMADAQCBAAJAAkDAA0BAAABAgAB\
     AQEBA6ksrQqtCBGSjeF/HM4kRo1IPbS9xP9ngAAAAAD/AAAAAAAAAAAAAAAAAIA/AAAAAAAAgD8AAIA/AAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAA\
     AACAPwAAgD8AAAAAAACAPwAAAAAAAAAAAACAPwAAAAAAAIA/AACAPwAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAgD8AAIA/AAAAAAAAgD8AAAAA\
@@ -30,21 +30,21 @@ const ROW: &str = "RFJBQ08CAgEAAAAMGAEAAgEAAwIEBQYEBgcICgkICwoMDQ4MDg8QEhEQExIUF
     AAAAAAAAAAAAAIA/AAEBAQEEASwDrRBVAxBCZNo8DNEzYaCu4e8cS5GAAAAAAAMAAAAAAQEBAQMdJ1UNkQsP2VFw4/C6Q9lWflwjCUeAAAAAAP8P\
     AAAAAAC/AAAAvwAAAL8AAIA/DA==";
 
-/// Four squares of the plane around the origin; towards −x there is a seam of texture coordinates, towards +x one of normals,
-/// and both end in the middle.
+/// Four squares of the plane around the origin, with a seam of texture coordinates towards −x and one of normals towards +x,
+/// which both end in the middle.
 const SEAMS: &str = "RFJBQ08CAgEBAAAACQgCCAIAA3/aB/8BEeADAD2B4APgOYEDAAEAAQEA/wAAAQMJAgEAAAEBCQMAAQABAAkDAAICAAAAPwAAAD8AAAAAAAAAPwAAAAAAAAAA\
     AAAAPwAAAAAAAIA/AAAAPwAAgD8AAAAAAACAPwAAgD8AAAA/AACAPwAAQEAAAAA/AAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAA\
     gD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD9DH5M+AAAAABo0dT8BAQEA\
     DwOtKi9VFQMqYkz///9vZvz/AECZAQD8/wAAAAAAAAAA/z8AAAAAgL8AAIC/zczMvQAAAEAO";
 
-/// A grid of quads whose colours have seams, as small as the encoder makes it (its level 10).
+/// A grid of quads with seams in its colours, at the encoder's strongest compression (level 10).
 const SLOW: &str = "RFJBQ08CAgEBAAAAQGIBYgcAHF/7VKtPVav6VFWrqk9V1VNV1aeqqlpVVX2qqgr/AREEBKhanIcCAAEA/wABAQICAwEAAQEACQMAAQIEAQEBBXs5MaEBHQH/\
     z60DiQM1AqUClgEYl+HK16sn/GS3HxWGtDF/0Z4znH+f/9MyY/nDVx65sPkh/1SItj0wjV4vYwFsSs/P6BUEE/wQcJ4ZVf5d6Q6M3nRoEzL29atfIlFL5uV9\
     lWB9Ja79mbUC4WBxOF66gKKJK03LZeP5Ex0lzvDYQxZsrC4ezNQ465BORfcQvNZPVyNE/ZmMTKi1+Staj2oq4GipgYgCboACAQEgAAAAAAAAALQAAAAEAQEA\
     DwMBOAEFJwECAQEIAJxuir7vv4jb9rYtXyXJJNlXlCQA8CuICKgApAAAgggAAAAAAAAAAAAAAAAAAAAAGf8Cs0FIywkaLxcaE1UleoIAAAAAAAD/PwAAAACA\
     vwAAgL+amZm+AAAAQA4=";
 
-/// The numbers of the attributes in these streams, with the accessors that a file needs for them.
+/// Ids of the attributes in these streams, with the accessors that a file needs for them.
 const ATTRIBUTES: &[(&str, u32, u32, &str, bool)] = &[
     ("POSITION", 13, 5126, "VEC3", false),
     ("NORMAL", 12, 5126, "VEC3", false),
@@ -56,7 +56,7 @@ fn stream(text: &str) -> Vec<u8> {
     base64::engine::general_purpose::STANDARD.decode(text).unwrap()
 }
 
-/// A box that is nothing but a stream.
+/// A box whose data is only in a stream.
 fn file(stream: &[u8]) -> Builder {
     let mut file = Builder::new();
     let view = file.view(stream, &[]);
@@ -170,7 +170,7 @@ fn streams_are_drawn_whole_whatever_numbers_their_accessors_declare() {
             assert!(loaded.warnings.iter().any(|w| w.text.contains(&said)), "{:?}", loaded.warnings);
         }
     }
-    // One accessor alone, and a morph target of as many values as are declared.
+    // A single wrong accessor, and a morph target with as many values as declared.
     let mut unequal = file(&stream(WALK));
     unequal.root["accessors"][2]["count"] = json!(23);
     let loaded = unequal.load();
@@ -186,7 +186,7 @@ fn streams_are_drawn_whole_whatever_numbers_their_accessors_declare() {
     assert_eq!(triangles(&loaded), plain);
     let told = loaded.warnings.iter().find(|w| w.code.ends_with("morph-target-invalid-attribute-count")).unwrap();
     assert_eq!(told.text, "23 elements for 24 vertices");
-    // More vertices than two bytes can number are no matter: they are not kept so.
+    // The index type of the accessor does not limit decoded indices.
     let mut file = file(&stream(WALK));
     file.root["accessors"][0]["componentType"] = json!(5121);
     assert_eq!(triangles(&file.load()), plain);
@@ -216,7 +216,7 @@ fn what_cannot_be_decoded_yet_tells_which_level_of_compression_can() {
 
 #[test]
 fn absurd_numbers_take_no_memory() {
-    // Triangles, after the vertices at byte 12.
+    // Number of triangles, after that of the vertices at byte 12.
     let mut many = stream(WALK);
     many.splice(13..14, [0xff, 0xff, 0xff, 0xff, 0x07]);
     assert!(file(&many).fault().contains("more than can be decoded"));
@@ -257,7 +257,7 @@ fn a_stream_that_is_cut_off_is_one_line() {
     for text in [WALK, SMALL, ROW] {
         let stream = stream(text);
         for length in 0..stream.len() {
-            // A last byte may say nothing new.
+            // The last bytes may be redundant.
             let lives = length > 0 && survives(&file(&stream[..length]).gltf(), &format!("{length} bytes"));
             assert!(!lives || length + 5 > stream.len(), "{length} of {} bytes", stream.len());
         }
@@ -280,7 +280,7 @@ fn a_flipped_bit_in_a_stream_never_panics() {
 
 #[test]
 fn vertices_are_numbered_as_by_the_encoder_of_the_format() {
-    // The corner, axis and side of each vertex in the order that Google's decoder gives.
+    // Corner, axis and side of each vertex, in the order of Google's decoder.
     const VERTICES: &str =
         "110 300 022 302 210 122 222 212 202 120 310 002 102 312 220 010 020 000 322 200 112 012 100 320";
     const INDICES: [u16; 36] = [
@@ -295,10 +295,10 @@ fn vertices_are_numbered_as_by_the_encoder_of_the_format() {
     assert_eq!(indices, INDICES.map(u32::from));
 }
 
-/// A seam that ends at a vertex does not part its corners, nor do two of different attributes.
+/// A seam that ends at a vertex does not split it, nor do two seams of different attributes.
 #[test]
 fn seams_that_end_at_one_vertex_leave_it_whole() {
-    // As Google's decoder gives them.
+    // As decoded by Google's decoder.
     const PLACES: [[f32; 2]; 11] = [
         [-1.0, -1.0],
         [0.0, 0.0],

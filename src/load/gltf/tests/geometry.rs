@@ -152,7 +152,7 @@ fn primitives_that_share_a_pool_of_vertices_take_only_their_own() {
         })
         .collect();
     file.set("meshes", json!([{ "primitives": primitives }]));
-    // Whole pools would take 400 · 50 000 · 32 bytes.
+    // Reading whole pools would take 400 · 50 000 · 32 bytes.
     let options = LoadOptions { limits: Limits { memory: 64 << 20, ..Limits::default() }, ..LoadOptions::default() };
     let scene = load_bytes(Path::new("a.glb"), file.glb(), &options).unwrap().scene;
     assert_eq!(scene.meshes.len(), 400);

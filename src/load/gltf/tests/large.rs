@@ -1,10 +1,10 @@
-//! Files with a hundred thousand of everything: what takes time in proportion to the square of that never ends here.
+//! Files with a hundred thousand of everything, on which quadratic algorithms would never end.
 
 use super::*;
 
 const MANY: usize = 100_000;
 
-/// A list of JSON values.
+/// A list of `MANY` JSON values.
 fn all(one: impl Fn(usize) -> Value) -> Value {
     (0..MANY).map(one).collect()
 }
@@ -16,7 +16,7 @@ fn meshes_materials_and_shapes_of_nodes_are_each_found_again() {
     file.set("materials", all(|_| json!({})));
     let primitive = |i: usize| json!({"attributes": {"POSITION": positions}, "material": i});
     file.set("meshes", all(|i| json!({"primitives": [primitive(i)], "weights": [0]})));
-    // Every second node shows the shape of the one before, in two ways to say it.
+    // Every second node has the shape of the one before, with explicit weights.
     let weights = |i: usize| json!({"mesh": i - i % 2, "weights": [0]});
     file.set("nodes", all(|i| if i % 2 == 0 { json!({"mesh": i}) } else { weights(i) }));
     file.set("scenes", json!([{"nodes": all(|i| json!(i))}]));
@@ -48,7 +48,7 @@ fn skins_of_a_deep_hierarchy_find_their_common_root() {
     file.set("skins", all(|i| json!({"joints": [0, i], "skeleton": MANY / 2})));
     let loaded = file.load();
     let told: Vec<_> = loaded.warnings.iter().map(|w| (w.code, w.place.as_str(), w.count as usize)).collect();
-    // Skin 0 names its joint twice; from the middle on, joints are above what should be above all of them.
+    // Skin 0 lists its joint twice; from the middle on, the skeleton is below a joint.
     let above = format!("skins[{}].skeleton", MANY / 2 + 1);
     assert_eq!(
         told,
@@ -135,6 +135,6 @@ fn bounds_of_accessors_that_lie_over_each_other_are_compared_for_some_of_them() 
     file.root.as_object_mut().unwrap().remove("scene");
     let loaded = file.load();
     let compared: u32 = loaded.warnings.iter().map(|warning| warning.count).sum();
-    // Twice the buffer and 2²⁸ bytes, of 3.6·10⁹.
+    // Twice the buffer and 2²⁸ bytes, out of 3.6·10⁹.
     assert_eq!(compared, ((1 << 28) + 2 * 36_000) / 36_000);
 }

@@ -126,7 +126,7 @@ fn unlit_and_specular_glossiness_materials_keep_their_look() {
     assert_eq!(scene.materials[1].base_color, Vec3::splat(0.5));
 }
 
-/// A triangle whose material has both descriptions; its pictures are not there.
+/// A triangle whose material has both descriptions, with missing pictures.
 fn both_descriptions(specular_glossiness: Value) -> Loaded {
     let mut file = Builder::new();
     let (positions, uvs) = (file.triangle(), file.floats("VEC2", &[0.; 6]));
@@ -231,7 +231,7 @@ fn a_texture_without_an_image_is_told() {
     assert_eq!(told.iter().filter(|t| t.contains("textures[0]: the texture names no image")).count(), 1, "{told:?}");
 }
 
-// Where names in another case are other files.
+// On systems where file names are case-sensitive.
 #[cfg(target_os = "linux")]
 #[test]
 fn images_and_buffers_named_in_another_case_are_read_and_told() {
@@ -294,7 +294,7 @@ fn what_has_a_direction_brings_tangents_and_the_rest_does_not() {
     }
 }
 
-/// A texture of 4×4 pixels as UASTC: one block of mode 8, which is one colour.
+/// A texture of 4×4 pixels as UASTC: one block of mode 8, a solid colour.
 #[cfg(feature = "basisu")]
 fn ktx2([r, g, b]: [u8; 3]) -> String {
     let bits = 0b10111 | u128::from(r) << 5 | u128::from(g) << 13 | u128::from(b) << 21 | 255 << 29;

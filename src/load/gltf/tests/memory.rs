@@ -1,4 +1,4 @@
-//! Files that would take more memory than is allowed, or more stack than there is: one line, before it is taken.
+//! Files that exceed the memory limit or would overflow the stack: one fault, before any is used.
 
 use super::*;
 
@@ -6,7 +6,7 @@ fn limited(memory: u64) -> LoadOptions {
     LoadOptions { limits: Limits { memory, ..Limits::default() }, ..LoadOptions::default() }
 }
 
-/// The one line that refuses a file.
+/// The only fault of a refused file.
 fn refused(path: &Path, bytes: &[u8], memory: u64) -> String {
     match load_bytes(path, bytes.to_vec(), &limited(memory)) {
         Err(LoadError::Input(faults)) if faults.len() == 1 => faults[0].to_string(),

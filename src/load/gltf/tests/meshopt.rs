@@ -5,7 +5,7 @@ use super::*;
 use crate::load::gltf::meshopt_codec::{Filter, Mode, Shape, decode};
 use ::meshopt::{EncodeExpMode, encode_filter_color, encode_filter_exp, encode_filter_oct, encode_filter_quat};
 
-/// A compressed view: the stream, its mode and filter, bytes of an element, elements.
+/// A compressed view: the stream, its mode and filter, bytes per element, number of elements.
 struct Packed {
     stream: Vec<u8>,
     mode: &'static str,
@@ -20,7 +20,7 @@ fn vertices<T>(elements: &[T], filter: &'static str, version: i32) -> Packed {
 }
 
 impl Packed {
-    /// Adds the view, and an accessor for the whole of it.
+    /// Adds the view, and an accessor for all of it.
     fn add(&self, file: &mut Builder, name: &str, accessor: Value) -> usize {
         let raw = file.view(&self.stream, &[]);
         let offset = file.root["bufferViews"][raw]["byteOffset"].clone();
@@ -38,7 +38,7 @@ impl Packed {
     }
 }
 
-/// The box in compressed views; `version` of the vertex streams.
+/// The box in compressed views; `version` is that of the vertex streams.
 fn file(name: &str, version: i32, filtered: bool) -> Builder {
     let plain = Plain::new();
     let mut file = Builder::new();
@@ -76,7 +76,7 @@ fn file(name: &str, version: i32, filtered: bool) -> Builder {
     file
 }
 
-/// The file with a second buffer that stands in for the compressed one.
+/// The file with a second buffer as the fallback of the compressed data.
 fn with_stand_in(file: &Builder, stand_in: &Value) -> Vec<u8> {
     let mut root: Value = serde_json::from_slice(&file.gltf()).unwrap();
     let buffers = root["buffers"].as_array_mut().unwrap();
@@ -111,14 +111,14 @@ fn filters_give_back_what_was_encoded() {
     };
     let shape = |filter, stride| Shape { mode: Mode::Attributes, filter, stride, count: 2 };
     let half = std::f32::consts::FRAC_1_SQRT_2;
-    // The largest component comes back positive.
+    // The largest component is decoded as positive.
     let turns = [[0.0, half, 0.0, half], [0.5, -0.1, 0.7, 0.5]];
     let quaternions = vertices(&encode_filter_quat(&turns, 16), "", 0);
     close(&decode(&quaternions.stream, &shape(Filter::Quaternion, 8)).unwrap(), 32767.0, &turns, 1e-3);
     let directions = [[0.6, 0.0, 0.8, 1.0], [0.0, -1.0, 0.0, -1.0]];
     let octahedral = vertices(&encode_filter_oct::<i16>(&directions, 16), "", 1);
     close(&decode(&octahedral.stream, &shape(Filter::Octahedral, 8)).unwrap(), 32767.0, &directions, 1e-3);
-    // Below one half, a component is the same with and without a sign.
+    // Below one half, a component reads the same as a signed and an unsigned integer.
     let colors = [[0.25, 0.45, 0.125, 0.4], [0.1, 0.0, 0.4, 0.3]];
     let luma = vertices(&encode_filter_color::<u16>(&colors, 16), "", 1);
     close(&decode(&luma.stream, &shape(Filter::Color, 8)).unwrap(), 65535.0, &colors, 1e-3);
@@ -139,7 +139,7 @@ fn vertices_of_every_size_come_back() {
     for words in [1, 3, 8, 63, 64] {
         let count = bytes.len() / (words * 4);
         let raw = &bytes[..count * words * 4];
-        // The encoder takes a vertex for what its type says; words of 4 bytes and columns of them are not the same.
+        // The encoder sees the type of a vertex: words of 4 bytes and arrays of them encode differently.
         let stream = match words {
             1 => ::meshopt::encode_vertex_buffer(raw.as_chunks::<4>().0),
             3 => ::meshopt::encode_vertex_buffer(raw.as_chunks::<12>().0),
@@ -205,7 +205,7 @@ fn uncompressed_data_stands_in_for_a_damaged_stream_unless_the_extension_is_requ
     let mut stand_in = empty(name);
     stand_in["byteLength"] = json!(288);
     stand_in["uri"] = json!(format!("data:;base64,{data}"));
-    // Only the positions have a stand-in; the others are read from their streams.
+    // Only the positions have a fallback; the others are read from their streams.
     for i in [0, 2, 3, 4] {
         file.root["bufferViews"][i]["buffer"] = json!(2);
     }

@@ -1,4 +1,4 @@
-//! Whole files, made in memory, one feature each.
+//! Whole files, built in memory, one feature each.
 
 mod animation;
 #[cfg(any(feature = "draco", feature = "meshopt"))]
@@ -33,7 +33,7 @@ struct Builder {
 }
 
 impl Builder {
-    /// A file with one node that shows mesh 0.
+    /// A file with one node, which has mesh 0.
     fn new() -> Self {
         let root = json!({
             "asset": {"version": "2.0"},
@@ -86,7 +86,7 @@ impl Builder {
         self.floats("VEC3", &[0., 0., 0., 1., 0., 0., 0., 1., 0.])
     }
 
-    /// A file whose mesh 0 is this primitive.
+    /// Sets mesh 0 to this primitive alone.
     fn primitive(&mut self, primitive: Value) -> &mut Self {
         self.root["meshes"] = json!([{"primitives": [primitive]}]);
         self
@@ -142,7 +142,7 @@ fn fault(bytes: &[u8]) -> String {
     }
 }
 
-/// Codes of warnings, bounds of positions aside, which these files leave out.
+/// Codes of the warnings, except those about missing bounds of positions.
 fn codes(loaded: &Loaded) -> Vec<&'static str> {
     let all = loaded.warnings.iter().map(|w| w.code);
     all.filter(|c| *c != "gltf-mesh-primitive-position-accessor-without-bounds").collect()
@@ -183,7 +183,7 @@ fn data_that_is_used_for_two_things_is_read_twice_with_a_warning() {
     let positions = file.triangle();
     let indices = file.shorts(&[0, 1, 2]);
     file.root["accessors"][indices]["bufferView"] = json!(0);
-    // The first three shorts of the positions are zeros and stand for one corner.
+    // The first two shorts of the positions are zeros, and index the same vertex.
     file.root["accessors"][indices]["count"] = json!(2);
     file.primitive(json!({"attributes": {"POSITION": positions}, "indices": indices, "mode": 3}));
     assert_eq!(codes(&file.load()), ["gltf-buffer-view-target-override"]);

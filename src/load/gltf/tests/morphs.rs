@@ -1,4 +1,4 @@
-//! Morph targets: what their sums give, and what is told of those that cannot be used.
+//! Morph targets: their weighted sums, and warnings about unusable ones.
 
 use super::*;
 
@@ -15,7 +15,7 @@ fn morphing(targets: impl FnOnce(&mut Builder) -> Value, weights: &[f32]) -> Loa
 
 #[test]
 fn normals_of_several_targets_are_added_up_before_they_are_made_unit() {
-    // 0.4 of each: what they take to the sides cancels out.
+    // 0.4 of each: their sideways parts cancel out.
     let sides = |file: &mut Builder, order: [f32; 2]| {
         let target = |x: f32| [x, 0., -1., x, 0., -1., x, 0., -1.];
         Value::from_iter(order.map(|x| json!({"NORMAL": file.floats("VEC3", &target(x))})))
@@ -41,7 +41,7 @@ fn of_a_target_that_changes_what_the_primitive_has_not_only_that_is_left_out() {
     assert!(told.ends_with("; that attribute of the target is left out"), "{told}");
 }
 
-/// A triangle of this colour and with these texture coordinates at all corners, which targets change.
+/// A triangle with this colour and these texture coordinates at all corners, which morph targets change.
 fn painted(color: [f32; 4], uv: [f32; 2], targets: impl FnOnce(&mut Builder) -> Value, weights: &[f32]) -> Loaded {
     let mut file = Builder::new();
     let positions = file.triangle();

@@ -1,5 +1,5 @@
-//! Our own models with something broken in them, at random but the same every time: whatever it is, loading ends in a
-//! scene that makes sense or in a message, and stays within its memory.
+//! Our own models with random but reproducible errors: loading always ends in a valid scene or in a message, and stays within
+//! its memory.
 
 use super::*;
 use crate::load::Moment;
@@ -7,7 +7,7 @@ use crate::math::random::Random;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 
-/// Broken copies of each model, of each kind.
+/// Broken copies of each model, per kind of error.
 const CASES: u64 = 30;
 
 const MEMORY: u64 = 1 << 28;
@@ -38,10 +38,10 @@ fn try_all(name: &str, mutate: impl Fn(&[u8], &mut Random) -> Vec<u8>) {
     assert!(refused > 0, "{name}: {loaded} loaded, {refused} refused");
 }
 
-/// Whether a file was loaded.
+/// Loads a file; returns whether it was accepted.
 fn try_one(path: &Path, bytes: Vec<u8>) -> bool {
     let limits = Limits { memory: MEMORY, ..Limits::default() };
-    // Animations are read only where one is played.
+    // Animations are read only when one is played.
     let moment = Some(Moment { animation: None, time: 0.7 });
     let options = LoadOptions { limits, moment, ..LoadOptions::default() };
     let loaded = match load_bytes(path, bytes, &options) {
@@ -71,7 +71,7 @@ fn try_one(path: &Path, bytes: Vec<u8>) -> bool {
     true
 }
 
-/// The JSON of a GLB, and what follows it.
+/// The JSON of a GLB, and the bytes after it.
 fn parts(glb: &[u8]) -> (&[u8], &[u8]) {
     let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
     glb[20..].split_at(length)
@@ -81,7 +81,7 @@ fn parts(glb: &[u8]) -> (&[u8], &[u8]) {
 fn files_with_wrong_bytes_end_in_a_scene_or_a_message() {
     try_all("bytes", |bytes, random| {
         let mut bytes = bytes.to_vec();
-        // Most of a file is vertices; headers and JSON deserve as many errors.
+        // Most of a file is vertices; half of the errors go to headers and JSON.
         let ends = [bytes.len(), 20 + parts(&bytes).0.len()];
         for _ in 0..=random.below(4) {
             let end = ends[random.below(2)];
@@ -96,7 +96,7 @@ fn files_with_wrong_bytes_end_in_a_scene_or_a_message() {
 fn files_that_are_cut_off_end_in_a_scene_or_a_message() {
     try_all("cut", |bytes, random| {
         let mut bytes = bytes[..random.below(bytes.len())].to_vec();
-        // Half of them with a header that agrees.
+        // Half of them with a matching length in the header.
         if random.below(2) == 0 && bytes.len() >= 12 {
             let length = bytes.len() as u32;
             bytes[8..12].copy_from_slice(&length.to_le_bytes());
@@ -122,7 +122,7 @@ fn files_with_wrong_values_end_in_a_scene_or_a_message() {
     });
 }
 
-/// Changes one value, any one: an element or member of a list or object somewhere.
+/// Changes one value at random: an element or member of a list or object somewhere.
 fn change(value: &mut Value, whole: &Value, random: &mut Random) {
     let count = match value {
         Value::Array(list) => list.len(),
@@ -149,7 +149,7 @@ fn change(value: &mut Value, whole: &Value, random: &mut Random) {
     }
 }
 
-/// A value that should not be there.
+/// A value of a wrong type or size.
 fn wrong(value: &Value, whole: &Value, random: &mut Random) -> Value {
     let numbers = [0.0f64, -1.0, 1.0, 0.5, 255.0, 65_536.0, 4_294_967_296.0, 9.0e15, 1e38, 1e308, -1e308, 5123.0];
     match random.below(8) {

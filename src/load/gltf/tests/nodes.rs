@@ -1,4 +1,4 @@
-//! Where nodes put things: scenes, skins, copies, what is hidden.
+//! Placement by nodes: scenes, skins, copies, visibility.
 
 use super::*;
 use crate::scene::Instance;
@@ -132,7 +132,7 @@ fn a_mirrored_node_leaves_its_mesh_alone_and_mirroring_joints_turn_theirs() {
 
 #[test]
 fn what_primitives_of_a_skin_share_is_at_one_place() {
-    // A narrow triangle and a wide one, which share two corners, turned by a joint.
+    // A narrow and a wide triangle with two common corners, rotated by a joint.
     let mut file = Builder::new();
     let shared = [0.1, 0.0, 0.0, 0.3, 0.7, 0.0];
     let narrow = file.floats("VEC3", &[&shared[..], &[0.2, 0.4, 0.05]].concat());

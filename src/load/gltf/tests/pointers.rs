@@ -1,9 +1,9 @@
-//! KHR_animation_pointer: what pointers may change, how, and what becomes of those that lead nowhere.
+//! KHR_animation_pointer: targets that pointers may change, their interpolation, and invalid pointers.
 
 use super::*;
 use crate::load::Moment;
 
-/// A triangle of a material with maps, under a camera and a lamp, and channels for pointers.
+/// A triangle of a material with maps, with a camera and a light, and channels for pointers.
 struct Pointing {
     file: Builder,
     channels: Vec<Value>,
@@ -52,7 +52,7 @@ impl Pointing {
         Self { file, channels: Vec::new(), samplers: Vec::new() }
     }
 
-    /// One more channel, whose values are at 0 s and 1 s.
+    /// Adds a channel with keys at 0 s and 1 s.
     fn aim(&mut self, pointer: &str, kind: &str, values: &[f32]) -> &mut Self {
         let output = self.file.floats(kind, values);
         self.aim_at(pointer, output, "LINEAR")
@@ -74,7 +74,7 @@ impl Pointing {
     }
 }
 
-/// The only warning besides those of bounds.
+/// All warnings, joined, except those about missing bounds.
 fn warning(loaded: &Loaded) -> String {
     let all = loaded.warnings.iter().filter(|w| !w.code.ends_with("without-bounds"));
     all.map(ToString::to_string).collect::<Vec<_>>().join("\n")
@@ -134,7 +134,7 @@ fn integers_stand_for_themselves_unless_they_are_normalized() {
     for (normalized, middle) in [(false, 100.0), (true, 100.0 / 255.0)] {
         let mut file = Pointing::new();
         let output = file.file.accessor(&[0, 0, 0, 0, 200, 0, 0, 0], 5121, "SCALAR", 2, normalized);
-        // Elements of a byte each lie one after the other.
+        // Elements of one byte, packed.
         file.file.root["accessors"][output]["count"] = json!(2);
         let view = file.file.view(&[0, 200], &[]);
         file.file.root["accessors"][output]["bufferView"] = json!(view);
@@ -144,7 +144,7 @@ fn integers_stand_for_themselves_unless_they_are_normalized() {
     }
 }
 
-/// Whether node 1, with its camera, and node 2, with its lamp, are visible: not before 1 s.
+/// Animates the visibility of a node: hidden before 1 s.
 fn switching(node: usize, interpolation: &str, normalized: bool) -> Pointing {
     let mut file = Pointing::new();
     file.file.root["nodes"][1]["extensions"] = json!({"KHR_node_visibility": {}});
@@ -180,7 +180,7 @@ fn what_is_switched_off_shows_no_mesh_keeps_its_camera_and_its_lamp_is_dark() {
         assert_eq!((scene.instances.len(), scene.cameras.len(), scene.lights.len()), (meshes, 1, 1), "{time}");
         assert_eq!(scene.lights[0].intensity == Vec3::ZERO, time < 1.0);
     }
-    // At rest, and where nothing switches it on, a hidden lamp is none.
+    // At rest, and if nothing switches it on, a hidden light does not exist.
     file.file.root["nodes"][1]["extensions"] = json!({"KHR_node_visibility": {"visible": false}});
     let scene = load(&file.file.gltf()).scene;
     assert_eq!((scene.instances.len(), scene.cameras.len(), scene.lights.len()), (1, 1, 0));
@@ -235,7 +235,7 @@ fn weights_one_by_one_take_the_memory_of_all_of_them_once() {
     }
     let channel = json!({"channels": file.channels, "samplers": file.samplers});
     file.file.set("animations", json!([channel]));
-    // Charged for each channel, these weights would be 48 MB.
+    // If each channel were charged, these weights would take 48 MB.
     let limits = Limits { memory: 40 << 20, ..Limits::default() };
     let options = LoadOptions { moment: Some(Moment { animation: None, time: 0.5 }), limits, ..LoadOptions::default() };
     let loaded = load_bytes(Path::new("a.gltf"), file.file.gltf(), &options).unwrap();

@@ -1,4 +1,4 @@
-//! What is said of files that are refused, and what helps.
+//! Messages and remedies of refused files.
 
 use super::*;
 

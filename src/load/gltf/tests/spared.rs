@@ -1,4 +1,4 @@
-//! Faults of parts that a picture can do without: declared bounds, cameras, what is in materials and lights.
+//! Faults in parts that a picture can do without: declared bounds, cameras, properties of materials and lights.
 
 use super::*;
 
@@ -26,7 +26,7 @@ fn bounds_of_a_wrong_length_or_kind_are_told_and_nothing_hangs_on_them() {
     let told = bounded(json!([0, 0]), right).warnings[0].to_string();
     let expected = "a.gltf:accessors[0].min: 2 numbers for elements of 3; bounds are computed from the data";
     assert_eq!(told, expected);
-    // Each number is compared with what it stands for.
+    // A component without a number does not shift the others.
     assert_eq!(codes(&bounded(json!([0, 0, 0]), json!([null, 1, 0]))), ["gltf-type-mismatch"]);
 }
 
@@ -81,7 +81,7 @@ fn of_two_projections_that_of_the_camera_s_type_counts() {
     assert_eq!(loaded.scene.cameras[0].projection, Projection::Orthographic { x_mag: 3.0, y_mag: 2.0 });
 }
 
-/// A triangle with this material, which may name one texture of one image.
+/// A triangle with this material, which may use one texture.
 fn made_of(material: Value) -> Loaded {
     let mut file = Builder::new();
     let positions = file.triangle();
@@ -112,7 +112,7 @@ fn what_is_wrong_in_a_material_is_left_out_and_the_rest_of_it_drawn() {
         let told = loaded.warnings.iter().find(|w| w.place == place);
         assert!(told.is_some_and(|w| w.remedy == "it is left out"), "{material}: {:?}", loaded.warnings);
     }
-    // A material that is none, and colours of three numbers.
+    // A material that is not an object, and a colour of three numbers.
     let loaded = made_of(json!("red"));
     assert_eq!((loaded.facts.faces, loaded.scene.materials[0].base_color), (1, Vec3::ONE));
     let loaded = made_of(json!({"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0], "metallicFactor": 0}}));
@@ -141,14 +141,14 @@ fn what_says_that_nothing_is_given_counts_as_not_given() {
     assert_eq!((loaded.facts.faces, codes(&loaded)), (1, vec!["gltf-blank"]));
     let told = loaded.warnings.iter().find(|w| w.code == "gltf-blank").unwrap();
     assert_eq!(told.text, "null, or -1 as an index, counts as not given (8 times)");
-    // What may be anything may be this.
+    // Values of any type may be null or −1.
     let mut file = Builder::new();
     let positions = file.triangle();
     file.primitive(json!({"attributes": {"POSITION": positions}}));
     file.root["asset"]["extras"] = json!({"source": -1, "light": null});
     file.set("extensionsUsed", json!(["VRM"])).set("extensions", json!({"VRM": {"mesh": -1, "meta": null}}));
     assert!(codes(&file.load()).is_empty(), "{:?}", file.load().warnings);
-    // What must be there is missing all the same.
+    // Required properties are missing all the same.
     let mut file = Builder::new();
     let positions = file.triangle();
     file.primitive(json!({"attributes": {"POSITION": positions}}));
@@ -170,7 +170,7 @@ fn lights_that_cannot_be_read_are_dark_and_the_model_is_drawn() {
     let sun = json!({"type": "directional", "color": [1, 0, 0, 1]});
     let loaded = lit(json!([sun]), json!(0));
     assert_eq!((loaded.facts.faces, loaded.scene.lights.len()), (1, 1));
-    // A spot has angles by default.
+    // Spot angles have defaults.
     let loaded = lit(json!([{"type": "spot"}]), json!(0));
     assert_eq!((loaded.facts.faces, loaded.scene.lights.len()), (1, 1));
     for (lights, light) in [
@@ -207,7 +207,7 @@ fn a_chunk_whose_length_is_a_little_wrong_is_read_where_all_that_is_needed_is_th
     file.primitive(json!({"attributes": {"POSITION": positions}}));
     let whole = file.glb();
     let bin = whole.len() - file.bytes.len() - 8;
-    // The length counts its own header; the file is said to end before the data does.
+    // A chunk length that includes its own header, and a file length that ends before the data does.
     let mut wide = whole.clone();
     wide[bin] += 8;
     let mut short = whole.clone();
@@ -217,7 +217,7 @@ fn a_chunk_whose_length_is_a_little_wrong_is_read_where_all_that_is_needed_is_th
         let loaded = load(&bytes);
         assert!(loaded.facts.faces == 1 && codes(&loaded).contains(&code), "{:?}", codes(&loaded));
     }
-    // What is needed is not there.
+    // Required data is missing.
     let cut = fault(&whole[..whole.len() - 4]);
     assert!(cut.contains("3 elements are declared, the data ends after 2"), "{cut}");
 }

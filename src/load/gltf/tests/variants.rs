@@ -1,4 +1,4 @@
-//! KHR_materials_variants: which material a primitive shows in which variant.
+//! KHR_materials_variants: the material of each primitive in each variant.
 
 use super::*;
 
@@ -34,7 +34,7 @@ fn with(file: &Builder, variant: &str) -> Result<Loaded, String> {
     load_bytes(Path::new("a.gltf"), file.gltf(), &options).map_err(|e| e.to_string())
 }
 
-/// Names of the materials that the primitives show.
+/// Names of the primitives' materials.
 fn shown(loaded: &Loaded) -> Vec<&str> {
     let scene = &loaded.scene;
     scene.meshes.iter().map(|mesh| scene.materials[mesh.material as usize].name.as_str()).collect()
@@ -58,7 +58,7 @@ fn a_variant_is_chosen_by_name_or_number_and_what_it_does_not_map_stays() {
         assert_eq!((shown(&loaded), loaded.facts.variant), (materials.to_vec(), Some(number)), "{wish}");
         assert!(codes(&loaded).is_empty(), "{:?}", loaded.warnings);
     }
-    // A name counts before a number.
+    // Names take precedence over numbers.
     assert_eq!(with(&file, "1").unwrap().facts.variant, Some(2));
 }
 
