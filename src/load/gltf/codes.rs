@@ -2,10 +2,10 @@
 //!
 //! The rule behind the rows: **refuse** when it is unknown what the file shows (it is not glTF 2.0, a required part is missing,
 //! an index is out of range); **warn** when a rule is broken but the rendering is clear, or when a part can be left out;
-//! **accept** silently what changes nothing. At most warnings are faults in animations, as unanimated nodes can be drawn at
-//! rest; in images, as a material can be drawn without a map; in cameras, as there is always another view; and in declared
-//! bounds, which rendering does not use ([`Code::verdict_at`]). In materials, textures, samplers, lights and names, properties
-//! that break the schema are left out (`mend`).
+//! **accept** silently what changes nothing. Faults are at most warnings in animations, as nodes can be drawn at rest; in
+//! images, as a material can be drawn without a map; in cameras, as there is always another view; and in declared bounds, which
+//! rendering does not use ([`Code::verdict_at`]). In materials, textures, samplers, lights and names, properties that break the
+//! schema are left out (`mend`).
 
 use crate::load::diagnostic::{CUT_OFF, DAMAGED};
 use std::sync::LazyLock;

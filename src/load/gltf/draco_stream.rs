@@ -26,7 +26,7 @@ impl Counts {
         most.min(self.faces.saturating_mul(3)).max(self.vertices)
     }
 
-    /// Temporary memory, in bytes, for decoding so many vertices and attributes.
+    /// Temporary memory, in bytes, for decoding so many vertices with so many attributes each.
     ///
     /// Per triangle: the opposite and the vertex of each corner, its seams, symbol and point; per value: its correction, its
     /// integer and float form, and its index.

@@ -13,7 +13,7 @@ use std::hash::Hash;
 /// Collects the textures of materials.
 pub(super) struct Textures<'a> {
     root: &'a Root,
-    /// Textures of the scene; `bitmap` is an index into `images`.
+    /// Textures of the scene; `bitmap` is an index into `pictures`.
     pub(super) list: Vec<Texture>,
     /// Sources of the bitmaps, in their order.
     pub(super) pictures: Vec<Picture>,

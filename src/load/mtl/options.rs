@@ -24,7 +24,7 @@ pub(super) struct Map {
     pub channel: Option<Channel>,
     /// `-s`: multiplies u and v (v pointing up).
     pub scale: DVec2,
-    /// `-o` and `-t`: added after scaling.
+    /// `-o`: added after scaling.
     pub offset: DVec2,
     /// `-clamp on`.
     pub clamp: bool,

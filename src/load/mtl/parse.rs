@@ -104,7 +104,7 @@ const MAPS: [(&[u8], Slot); 32] = [
     (b"map_anisor", Slot::AnisotropyRotation),
 ];
 
-/// Diagnostic for a decal: procedures of one program, not a picture, decide what it shows where.
+/// Diagnostic for a decal: procedures of one program, not a picture, decide what it shows.
 const DECAL: (&str, &str) = ("a decal (decal) is not drawn", "paint it into map_Kd");
 
 /// Diagnostic for a reflection map: a picture of the surroundings for one material alone, without the objects of the scene. Here

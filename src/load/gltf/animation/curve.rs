@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_spline_goes_through_its_keys_with_their_slopes() {
-        // At the middle of 2 s: half of each value, and an eighth of the span times each tangent.
+        // Half way through 2 s: half of each value, and an eighth of the span times the tangents' difference.
         let (a, b) = (smooth(9.0, 1.0, 4.0), smooth(-2.0, 3.0, 9.0));
         let middle = Between { before: 0, after: 1, span: 2.0, part: 0.5 };
         assert_eq!(numbers(Interpolation::CubicSpline, middle, &a, &b), [0.5 + 1.5 + 0.25 * 4.0 - 0.25 * -2.0]);
