@@ -15,7 +15,7 @@ pub(super) use model::{named_model, only_model, source, unreadable};
 pub(crate) use opened::{in_archive, opened, split};
 
 use super::Diagnostic;
-use super::detect::{ZIP, is_called_a_model, is_zipped_kind};
+use super::detect::{ZIP, is_zipped_kind};
 use flate2::read::DeflateDecoder;
 use rawzip::{CompressionMethod, ReaderAt, ZipArchive, ZipArchiveEntryWayfinder, ZipFileHeaderRecord, ZipLocator};
 use std::collections::BTreeMap;
@@ -47,8 +47,6 @@ pub struct Archive {
     entries: BTreeMap<String, Entry>,
     /// Bytes of memory that the archive takes.
     held: u64,
-    /// Bytes of all its files once unpacked, divided by the number of models.
-    share: u64,
 }
 
 /// A file in an archive.
@@ -179,18 +177,14 @@ impl Archive {
         if directory > DIRECTORY {
             return Err(ArchiveFault::Crowded(directory).into());
         }
-        let (mut entries, mut unpacked, mut models) = (BTreeMap::new(), 0_u64, 0_u64);
+        let mut entries = BTreeMap::new();
         let mut all = zip.entries(&mut chunk);
         while let Some(record) = all.next_entry().map_err(damaged)? {
             if let Some(name) = name_of(record.file_path().as_bytes()) {
-                models += u64::from(is_called_a_model(Path::new(&name)));
-                let entry = Entry::of(&record);
-                unpacked = unpacked.saturating_add(entry.length());
-                entries.insert(name, entry);
+                entries.insert(name, Entry::of(&record));
             }
         }
-        let share = unpacked / models.max(1);
-        Ok(Self { path: path.into(), zip, entries, held: PER_BYTE * directory, share })
+        Ok(Self { path: path.into(), zip, entries, held: PER_BYTE * directory })
     }
 
     /// Path of the archive, as the user named it.
@@ -205,7 +199,8 @@ impl Archive {
 
     /// Bytes of all its files once unpacked, divided by the number of models.
     pub fn share(&self) -> u64 {
-        self.share
+        let unpacked = self.entries.values().fold(0_u64, |sum, entry| sum.saturating_add(entry.length()));
+        unpacked / (self.models(Path::new("")).len() as u64).max(1)
     }
 
     /// Name in the archive of the file with this path, with `/` between folders; `None` if the path lies outside.

@@ -237,6 +237,9 @@ fn a_spoiled_file_is_told_and_none_is_unpacked_to_more_than_it_says() {
     let archive = Archive::from_bytes(Path::new("a.zip"), whole.clone()).unwrap();
     assert_eq!(archive.read(Path::new("long.txt"), 99_999).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
     assert_eq!(archive.share(), 100_015);
+    let models =
+        zip(&[("a.obj", &long), ("b.obj", &long), ("__MACOSX/._a.obj", b"x"), (".b.obj", b"x"), ("b.stl", b"")]);
+    assert_eq!(Archive::from_bytes(Path::new("a.zip"), models).unwrap().share(), 100_001, "two models");
     // Change a byte of the stored data.
     let at = whole.windows(6).position(|w| w == b"stored").unwrap();
     let mut spoiled = whole.clone();

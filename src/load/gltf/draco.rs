@@ -19,6 +19,7 @@ use gltf::json::{Index, Root};
 use rayon::prelude::*;
 use serde_json::{Map, Value};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::Path;
 
 const NAME: &str = "KHR_draco_mesh_compression";
@@ -151,12 +152,16 @@ impl<'a> Task<'a> {
     fn claim(&self, shown: Vec<(usize, Part)>, owners: &mut HashMap<usize, Part>) -> Result<bool, Diagnostic> {
         let mut new = false;
         for (accessor, part) in shown {
-            match owners.insert(accessor, part) {
-                Some(other) if other != part => {
+            match owners.entry(accessor) {
+                Entry::Vacant(free) => {
+                    free.insert(part);
+                    new = true;
+                }
+                Entry::Occupied(owner) if *owner.get() == part => {}
+                Entry::Occupied(_) => {
                     let text = format!("accessor {accessor} stands for two different parts of Draco streams");
                     return Err(self.fault("", text));
                 }
-                known => new |= known.is_none(),
             }
         }
         Ok(new)

@@ -9,14 +9,13 @@ use super::graph::Graph;
 use super::links::is_bind_matrix;
 use super::report::Report;
 use super::scene::{Draw, PosedMesh};
-use crate::math::frame::{center_of_most, spread};
+use crate::math::frame::{center_of_most, spread, stride};
 use crate::math::{DMat3, DMat4, DVec3, Vec3};
 use crate::scene::Mesh;
 use crate::scene::mesh::normal_from_object;
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Root, Skin as Source};
-use serde_json::Value;
 use std::collections::HashSet;
 
 /// Pose of the meshes that use a skin.
@@ -30,7 +29,7 @@ pub(super) struct Skin {
 /// Loads the skins of the document, by index; `None` for unusable ones. `posed` lists the meshes that use them.
 pub(super) fn load(reader: Reader, graph: &Graph, posed: &[PosedMesh], report: &mut Report) -> Vec<Option<Skin>> {
     let root = reader.root;
-    let middles = middles(root, posed);
+    let middles = middles(reader, posed);
     (0..root.skins.len())
         .map(|i| {
             check_skeleton(root, graph, i, report);
@@ -43,28 +42,29 @@ pub(super) fn load(reader: Reader, graph: &Graph, posed: &[PosedMesh], report: &
         .collect()
 }
 
-/// Centre of the meshes of each skin, before posing, by the declared bounds of positions; zero where there are none.
-fn middles(root: &Root, posed: &[PosedMesh]) -> Vec<DVec3> {
-    let corner = |said: &Option<Value>| {
-        let numbers = said.as_ref()?.as_array()?.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>()?;
-        <[f64; 3]>::try_from(numbers).ok().map(DVec3::from)
+/// Centre of the meshes of each skin, before posing, by a sample of their positions; zero without any.
+///
+/// Declared bounds are not used: they may be wrong, and those of normalized integers are integers.
+fn middles(reader: Reader, posed: &[PosedMesh]) -> Vec<DVec3> {
+    let sample = |primitive: &Primitive| {
+        let index = *primitive.attributes.get(&Checked::Valid(Semantic::Positions))?;
+        let count = u32::try_from(reader.root.accessors.get(index.value())?.count.0).ok()?;
+        let wanted: Vec<u32> = (0..count).step_by(stride(count as usize)).collect();
+        // What cannot be read is reported where the mesh is.
+        reader.floats::<3>(index, Pick::Only(&wanted)).ok()
     };
-    let bounds = |primitive: &Primitive| {
-        let index = primitive.attributes.get(&Checked::Valid(Semantic::Positions))?;
-        let accessor = root.accessors.get(index.value())?;
-        Some([corner(&accessor.min)?, corner(&accessor.max)?])
-    };
-    let mut corners: Vec<Vec<DVec3>> = vec![Vec::new(); root.skins.len()];
+    let mut points: Vec<Vec<DVec3>> = vec![Vec::new(); reader.root.skins.len()];
     for posed in posed {
-        let Some(of_skin) = posed.skin.and_then(|skin| corners.get_mut(skin)) else { continue };
-        let primitives = root.meshes.get(posed.mesh).into_iter().flat_map(|mesh| &mesh.primitives);
-        of_skin.extend(primitives.filter_map(bounds).flatten());
+        let Some(of_skin) = posed.skin.and_then(|skin| points.get_mut(skin)) else { continue };
+        let primitives = reader.root.meshes.get(posed.mesh).into_iter().flat_map(|mesh| &mesh.primitives);
+        let sampled = primitives.filter_map(sample).flatten().map(|p| Vec3::from(p).as_dvec3());
+        of_skin.extend(sampled.filter(|p| p.is_finite()));
     }
-    let middle = |corners: Vec<DVec3>| {
-        let (lo, hi) = around(corners.into_iter());
-        if lo.cmple(hi).all() { lo * 0.5 + hi * 0.5 } else { DVec3::ZERO }
+    let middle = |points: Vec<DVec3>| {
+        let (lo, hi) = around(points.iter().copied());
+        if points.is_empty() { DVec3::ZERO } else { center_of_most(lo, hi, spread(points.len()).map(|i| points[i])) }
     };
-    corners.into_iter().map(middle).collect()
+    points.into_iter().map(middle).collect()
 }
 
 /// Minimum and maximum of the finite points.

@@ -156,6 +156,38 @@ fn what_primitives_of_a_skin_share_is_at_one_place() {
 }
 
 #[test]
+fn declared_bounds_do_not_coarsen_the_positions_of_a_skin() {
+    let corners = [[1111_u16, 2222, 3333], [40_000, 2222, 3333], [1111, 50_000, 3333]];
+    for (normalized, most) in [(true, [40_000.0, 50_000.0, 3333.0]), (false, [1e9; 3])] {
+        let mut file = Builder::new();
+        let shorts: Vec<u8> = corners.iter().flat_map(|&[x, y, z]| [x, y, z, 0]).flat_map(u16::to_le_bytes).collect();
+        let floats: Vec<f32> = corners.iter().flatten().map(|&c| f32::from(c) / 65535.0).collect();
+        let positions = if normalized {
+            let view = file.view(&shorts, &[("byteStride", json!(8))]);
+            let accessor = json!({"bufferView": view, "componentType": 5123, "type": "VEC3", "count": 3});
+            file.push("accessors", accessor)
+        } else {
+            file.floats("VEC3", &floats)
+        };
+        let accessor = &mut file.root["accessors"][positions];
+        (accessor["normalized"], accessor["min"], accessor["max"]) = (json!(normalized), json!([0, 0, 0]), json!(most));
+        let joints = file.accessor(&[0; 12], 5121, "VEC4", 3, false);
+        let weights = file.floats("VEC4", &[1., 0., 0., 0.].repeat(3));
+        file.primitive(json!({"attributes": {"POSITION": positions, "JOINTS_0": joints, "WEIGHTS_0": weights}}));
+        file.set("nodes", json!([{"mesh": 0, "skin": 0}, {}]));
+        file.set("scenes", json!([{"nodes": [0, 1]}]));
+        file.set("skins", json!([{"joints": [1]}]));
+        file.set("extensionsUsed", json!(["KHR_mesh_quantization"]));
+        file.set("extensionsRequired", json!(["KHR_mesh_quantization"]));
+        let scene = file.load().scene;
+        for (position, corner) in scene.meshes[0].positions.iter().zip(floats.chunks(3)) {
+            let place = scene.instances[0].world_from_object.transform_point3(position.as_dvec3());
+            assert!(place.distance(Vec3::from_slice(corner).as_dvec3()) < 1e-7, "{normalized}: {place} {corner:?}");
+        }
+    }
+}
+
+#[test]
 fn a_skin_whose_joints_are_not_in_the_scene_is_drawn_with_a_warning() {
     let mut file = Builder::new();
     let positions = file.triangle();
