@@ -414,7 +414,7 @@ fn coarse(loaded: &Loaded, world: &World, file: &Path) -> Option<Diagnostic> {
 fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {
     let held = match loaded.facts.dropped.iter().map(|(_, n)| n).sum::<u64>() {
         0 if !loaded.warnings.is_empty() => "nothing to draw: warnings say what of it is left out".to_owned(),
-        0 => "nothing to draw: it holds no faces, lines or points, or only such as are scaled to nothing".to_owned(),
+        0 => "nothing to draw: it holds no faces, lines or points, or only such as are hidden or scaled to nothing".to_owned(),
         n => format!("nothing to draw: all of its {n} faces, lines, points and shapes had to be dropped"),
     };
     let draw_nothing = "--allow-empty draws the background";
