@@ -1,11 +1,11 @@
-//! Rays that are hard on a mesh.
+//! Kinds of rays that stress the watertightness of a mesh.
 
 use crate::accel::{Ray, Shapes};
 use crate::math::Vec3;
 use crate::math::random::Random;
 use crate::math::triangle;
 
-/// What rays are aimed at.
+/// Target of the rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aim {
     /// A corner of a triangle.
@@ -16,18 +16,18 @@ pub enum Aim {
     Edges,
     /// Along the plane of a triangle, through it.
     InPlane,
-    /// A triangle, at an angle of 10⁻¹ to 10⁻⁷ to its plane.
+    /// Across a triangle, at an angle of 10⁻¹ to 10⁻⁷ to its plane.
     Grazing,
-    /// Anywhere in the box of the mesh.
+    /// Any point in the bounding box of the mesh.
     Random,
 }
 
 impl Aim {
-    /// Every kind.
+    /// All kinds, in the order of reports.
     pub const ALL: [Self; 6] =
         [Self::Corners, Self::EdgeMiddles, Self::Edges, Self::InPlane, Self::Grazing, Self::Random];
 
-    /// As printed.
+    /// Name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Corners => "corners",
@@ -40,37 +40,37 @@ impl Aim {
     }
 }
 
-/// Makes rays for one set of triangles, in the frame of its vertices.
+/// Generator of rays for one set of triangles, in the frame of its vertices.
 #[derive(Clone, Debug)]
 pub struct Aimer<'a> {
     shapes: &'a Shapes,
     middle: Vec3,
-    /// Half the diagonal of the mesh.
+    /// Half the diagonal of the mesh's bounding box.
     reach: f32,
     random: Random,
 }
 
 impl<'a> Aimer<'a> {
-    /// `None` without triangles.
+    /// Generator for a mesh; `None` if it has no triangles.
     pub fn new(shapes: &'a Shapes, seed: u64) -> Option<Self> {
         if shapes.triangles.is_empty() {
             return None;
         }
         let corners = shapes.triangles.iter().flatten().map(|&i| shapes.vertices[i as usize]);
         let (lo, hi) = corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-        // Squares of what is very large or small are no numbers in `f32`.
+        // Squares of very large or very small lengths overflow or vanish in `f32`.
         #[expect(clippy::cast_possible_truncation, reason = "no longer than a few times the mesh")]
         let reach = (hi * 0.5 - lo * 0.5).as_dvec3().length() as f32;
         Some(Self { shapes, middle: lo * 0.5 + hi * 0.5, reach, random: Random::new(seed) })
     }
 
-    /// The same with other rays.
+    /// The same generator with another random sequence.
     #[must_use]
     pub fn reseeded(&self, seed: u64) -> Self {
         Self { random: Random::new(seed), ..*self }
     }
 
-    /// `count` rays.
+    /// Generates `count` rays.
     pub fn rays(&mut self, aim: Aim, count: usize) -> Vec<Ray> {
         (0..count).map(|i| self.ray(aim, i)).collect()
     }
@@ -98,13 +98,13 @@ impl<'a> Aimer<'a> {
         }
     }
 
-    /// Inside the mesh's box and outside of it in turn.
+    /// Random origin, alternately inside and outside the mesh's bounding box.
     fn start(&mut self, i: usize) -> Vec3 {
         let distance = if i.is_multiple_of(2) { 0.5 } else { 2.5 };
         self.middle + self.random.direction() * (distance * self.reach)
     }
 
-    /// How many times `dir` the mesh is long.
+    /// Half the diagonal of the mesh in lengths of `dir`; 1 if `dir` has no length.
     fn strides(&self, dir: Vec3) -> f32 {
         #[expect(clippy::cast_possible_truncation, reason = "an estimate")]
         let strides = (f64::from(self.reach) / dir.as_dvec3().length()) as f32;

@@ -1,28 +1,27 @@
-//! A gate of counts: they do not depend on the machine, so what goes beyond a limit is a change of the program.
+//! Gate on counts: they do not depend on the machine, so a count beyond its limit is a change of the program.
 //!
-//! Two reports of schema `meshray-bench/1` are compared, model by model, structure by structure, class by class. Models are
-//! found by file name, since reports are compared wherever the models lie; where several have that name, by the path as it
-//! was typed, or else by what is in the file. Both must be of the same model and the same rays; otherwise counts say nothing
-//! about each other.
+//! Compares two reports of schema `meshray-bench/1` model by model, structure by structure, class by class. Models are matched by
+//! file name, since reports are compared wherever the models lie; several models of one name are matched by the path as typed, or
+//! else by content hash. Both reports must cover the same model and the same rays; otherwise their counts are not comparable.
 
 use serde_json::Value;
 use std::str::FromStr;
 
-/// What may be limited: counts of each class, then sizes of a structure.
+/// Quantities that a limit can name: counts of each class, then sizes of a structure.
 const NAMES: [&str; 12] =
     ["n_it", "n_ts", "n_ets", "n_eets", "n_bit", "n_mb", "n_xf", "bytes", "n_in", "n_v", "n_ev", "n_oiv"];
 
-/// A change that is too much, such as `n_it>+1%` or `n_mb<-5%`.
+/// Limit on the change of a count, such as `n_it>+1%` or `n_mb<-5%`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limit {
     name: String,
-    /// Whether more is too much, or less.
+    /// Whether an increase breaks the limit; otherwise a decrease does.
     above: bool,
-    /// Of the baseline's value.
+    /// Allowed change, in percent of the baseline's value.
     percent: f64,
 }
 
-/// A limit as it is typed, such as `n_it>+1%`: what is limited, whether more of it is too much, and the bound.
+/// Splits a limit such as `n_it>+1%` into the quantity, whether an increase breaks it, and the bound.
 pub(crate) fn sides(text: &str) -> Option<(&str, bool, &str)> {
     let (name, rest) = text.split_at(text.find(['<', '>'])?);
     Some((name.trim(), rest.starts_with('>'), rest[1..].trim()))
@@ -45,13 +44,13 @@ impl FromStr for Limit {
 impl Limit {
     fn is_broken(&self, before: f64, now: f64) -> bool {
         let bound = before * (1.0 + self.percent / 100.0);
-        // Sums of whole numbers divided by whole numbers: the last digit is no change.
+        // The values are quotients of sums: a difference in the last digit is rounding, no change.
         let grain = 1e-9 * before.abs().max(now.abs());
         if self.above { now > bound + grain } else { now < bound - grain }
     }
 }
 
-/// What differs, by name where there are names.
+/// Describes the difference of two values, key by key where both are objects.
 fn unlike(before: &Value, now: &Value) -> String {
     let told = |before: &Value, now: &Value| format!("{before} before, {now} now");
     let (Value::Object(all), Value::Object(_)) = (before, now) else { return told(before, now) };
@@ -61,7 +60,7 @@ fn unlike(before: &Value, now: &Value) -> String {
     if each.is_empty() { told(before, now) } else { each.join("; ") }
 }
 
-/// A line for each count of `now` that changed too much since `baseline`; an error where they cannot be compared.
+/// Returns a line for each count of `now` that broke a limit since `baseline`; an error where the reports are not comparable.
 pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<String>, String> {
     if baseline["schema"] != now["schema"] {
         return Err(format!("its schema is {}, not {}", baseline["schema"], now["schema"]));
@@ -100,7 +99,7 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
                 return Err(format!("{name}: the baseline was made from {what} ({})", unlike(before, now)));
             }
         }
-        // Reports that do not say so are of models that keep nothing.
+        // Reports without the key are of models without kept instances.
         let kept = |model: &Value| model["kept_instances"].as_u64().unwrap_or(0);
         if kept(before) != kept(model) {
             let [before, now] = [kept(before), kept(model)];
@@ -133,7 +132,7 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
     Ok(lines)
 }
 
-/// What is asked of structures, among the settings.
+/// Settings that the structures depend on.
 const STRUCTURES: [&str; 9] = [
     "grid_density",
     "grid_resolution",
@@ -146,8 +145,8 @@ const STRUCTURES: [&str; 9] = [
     "mailbox",
 ];
 
-/// What was asked of structures in another way than in the baseline, which explains what changed; an earlier report may not
-/// say.
+/// Lists the structure settings that differ from the baseline's, which explains changed counts; a setting that an earlier report
+/// lacks is skipped.
 fn asked_otherwise(baseline: &Value, now: &Value) -> Option<String> {
     let said = |name: &'static str| Some((name, baseline["settings"].get(name)?, &now["settings"][name]));
     let other = STRUCTURES.into_iter().filter_map(said).filter(|(_, before, now)| before != now);
@@ -155,18 +154,18 @@ fn asked_otherwise(baseline: &Value, now: &Value) -> Option<String> {
     (!other.is_empty()).then(|| format!("structures were asked for in another way: {}", other.join("; ")))
 }
 
-/// Whether two rows are of one structure, with the same value of what is swept.
+/// Whether two rows are of the same structure and the same value of the swept parameter.
 fn is_one_structure(before: &Value, now: &Value) -> bool {
     before["accel"] == now["accel"] && before["setting"]["value"] == now["setting"]["value"]
 }
 
-/// The structure of a row, with its value of what is swept.
+/// Name of a row's structure, with its value of the swept parameter.
 fn structure(row: &Value) -> String {
     let name = row["accel"].as_str().unwrap_or_default();
     if row["setting"].is_object() { format!("{name} with {}", row["setting"]["value"]) } else { name.to_owned() }
 }
 
-/// Whether two values are the same, or, of objects, whatever the earlier one has.
+/// Whether two values are equal; of two objects, only keys of the earlier one are compared.
 fn is_same(before: &Value, now: &Value) -> bool {
     match before.as_object() {
         Some(before) => before.iter().all(|(key, value)| now[key] == *value),
@@ -174,7 +173,7 @@ fn is_same(before: &Value, now: &Value) -> bool {
     }
 }
 
-/// Whether a model of a report has this count.
+/// Whether a model of a report has values of this count.
 fn counts(model: &Value, key: &str) -> bool {
     items(&model["structures"]).iter().any(|row| {
         let mut classes = row["classes"].as_object().into_iter().flatten();
@@ -182,8 +181,8 @@ fn counts(model: &Value, key: &str) -> bool {
     })
 }
 
-/// Which of the models of a baseline this one was, of those that are not `found` yet if it is there several times; an error
-/// where there is none or nobody can say.
+/// Index of the baseline's model that matches `model`, preferring those not yet in `found`; an error where there is none or the
+/// match is ambiguous.
 fn earlier(all: &[Value], found: &[usize], model: &Value) -> Result<usize, String> {
     let name = file_name(&model["file"]);
     let same = |key: &'static str| move |at: &&usize| all[**at][key] == model[key];
@@ -204,7 +203,7 @@ fn earlier(all: &[Value], found: &[usize], model: &Value) -> Result<usize, Strin
     }
 }
 
-/// What a model of a baseline is called in messages: its file name, or its path where several have that.
+/// Name of a baseline's model in messages: its file name, or its path where several models share the file name.
 fn called<'a>(all: &'a [Value], model: &'a Value) -> &'a str {
     let name = file_name(&model["file"]);
     let several = all.iter().filter(|other| file_name(&other["file"]) == name).count() > 1;
@@ -230,7 +229,7 @@ fn compare(place: &str, before: &Value, now: &Value, limits: &[Limit], lines: &m
     }
 }
 
-/// In what other rays of a class were sent through a structure: slow ones get a sample.
+/// Describes the first class of which another number of rays was traced: slow structures get a sample.
 fn sampled_otherwise(before: &Value, now: &Value) -> Option<String> {
     let classes = before["classes"].as_object().into_iter().flatten();
     let numbers = classes.map(|(class, counts)| (class, &counts["rays"], &now["classes"][class]["rays"]));

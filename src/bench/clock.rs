@@ -1,4 +1,4 @@
-//! Times that are measured several times, and how far they spread.
+//! Times measured in several passes, and their spread.
 
 use crate::stopwatch::{Spent, Stopwatch};
 use std::time::Instant;
@@ -8,13 +8,13 @@ use std::time::Instant;
 pub struct Spread(Vec<f64>);
 
 impl Spread {
-    /// Adds a pass.
+    /// Adds the value of a pass.
     pub fn push(&mut self, value: f64) {
         let place = self.0.partition_point(|&v| v < value);
         self.0.insert(place, value);
     }
 
-    /// How many passes there were.
+    /// Number of passes.
     pub fn len(&self) -> usize {
         self.0.len()
     }
@@ -24,7 +24,7 @@ impl Spread {
         self.0.is_empty()
     }
 
-    /// The middle value (of the two middle ones, their mean); NaN when nothing was measured.
+    /// Median (with an even number of values, the mean of the middle two); NaN when nothing was measured.
     pub fn median(&self) -> f64 {
         match self.0.len() {
             0 => f64::NAN,
@@ -32,17 +32,17 @@ impl Spread {
         }
     }
 
-    /// The least value; NaN when nothing was measured.
+    /// Least value; NaN when nothing was measured.
     pub fn min(&self) -> f64 {
         self.0.first().copied().unwrap_or(f64::NAN)
     }
 
-    /// The largest value; NaN when nothing was measured.
+    /// Largest value; NaN when nothing was measured.
     pub fn max(&self) -> f64 {
         self.0.last().copied().unwrap_or(f64::NAN)
     }
 
-    /// Each value as `f` of it.
+    /// Applies `f` to each value.
     #[must_use]
     pub fn map(&self, f: impl Fn(f64) -> f64) -> Self {
         let mut mapped = Self::default();
@@ -51,15 +51,15 @@ impl Spread {
     }
 }
 
-/// Does `work` and tells how many seconds it took.
+/// Runs `work` and returns its result and the seconds it took.
 pub fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let start = Instant::now();
     let result = work();
     (result, start.elapsed().as_secs_f64())
 }
 
-/// Does `work` and tells how many seconds this thread spent on it: of the processor where the system says so (Unix), so
-/// that other programs hardly show; else by the clock on the wall.
+/// Runs `work` and returns its result and the seconds of this thread: CPU time where the system reports it (Unix), so that other
+/// programs hardly matter; else wall-clock time.
 pub fn processor_seconds<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let watch = Stopwatch::of_this_thread();
     let result = work();

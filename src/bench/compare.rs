@@ -1,7 +1,7 @@
-//! The same rays through every structure: are the hits the same, what did they cost.
+//! Sends the same rays through every structure and compares hits and costs.
 //!
 //! Counts and times come from separate passes: a timed pass carries no counters. The passes of all structures are
-//! interleaved, so that what disturbs the machine for a while disturbs all of them.
+//! interleaved, so that a temporary disturbance of the machine affects all of them.
 
 use super::clock::{Spread, timed};
 use super::rays::{Batch, Class, RaySet};
@@ -12,49 +12,49 @@ use crate::accel::{Accel, AccelChoice, AccelKind, AccelParams, AnyAccel};
 use crate::render::{Filters, World};
 use crate::threads;
 
-/// How to compare.
+/// Settings of a comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Which structures, each once.
+    /// Structures to compare, each once.
     pub kinds: Vec<AccelKind>,
     /// Parameters of the structures.
     pub params: AccelParams,
-    /// A parameter that takes several values; `kinds` are those that it changes.
+    /// Parameter to sweep over several values; `kinds` are then the structures that it changes.
     pub sweep: Option<Sweep>,
-    /// Timed passes; 0: only counts.
+    /// Number of timed passes; 0 only counts.
     pub passes: usize,
-    /// Threads that build and trace, at least 1.
+    /// Threads that build and trace; at least 1.
     pub threads: usize,
-    /// Rays of each class at most.
+    /// Maximum number of rays per class.
     pub rays: usize,
-    /// Ray/prim tests for each class that a slow structure may take in a pass; it gets as few rays as that allows.
+    /// Ray/prim tests per class that a slow structure may take in a pass; its number of rays follows from that.
     pub slow_tests: u64,
-    /// Changes the diffuse rays and what is sampled.
+    /// Seed of the diffuse rays and of the sampling.
     pub seed: u64,
 }
 
 impl Plan {
-    /// Half a minute or so for a mesh of a hundred thousand triangles.
+    /// Takes about half a minute for a mesh of a hundred thousand triangles.
     pub const PASSES: usize = 5;
-    /// See [`Self::rays`].
+    /// Default of [`Self::rays`].
     pub const RAYS: usize = 200_000;
-    /// See [`Self::slow_tests`].
+    /// Default of [`Self::slow_tests`].
     pub const SLOW_TESTS: u64 = 20_000_000;
 
-    /// Rays of each class that a slow structure gets at least.
+    /// Minimum number of rays per class for a slow structure.
     pub const FEWEST: usize = 16;
 
-    /// Rays that a slow structure gets of a class.
+    /// Number of rays per class for a slow structure.
     fn affordable(&self, prims: usize) -> usize {
         self.within_slow_tests(prims).max(Self::FEWEST)
     }
 
-    /// Whether a structure stays within what slow ones may take, with so many prims and the fewest rays.
+    /// Whether a structure stays within [`Self::slow_tests`] with `prims` prims and [`Self::FEWEST`] rays.
     pub fn can_bear(&self, kind: AccelKind, prims: usize) -> bool {
         !kind.is_slow() || self.within_slow_tests(prims) >= Self::FEWEST
     }
 
-    /// Every structure to build, in the order of the rows.
+    /// Structures to build, in the order of the rows.
     fn candidates(&self) -> Vec<Candidate> {
         let of = |&kind: &AccelKind| match &self.sweep {
             None => vec![Candidate { kind, params: self.params, setting: None }],
@@ -79,23 +79,23 @@ struct Candidate {
     setting: Option<Setting>,
 }
 
-/// The rays of one class as one structure gets them, and the answers they should have.
+/// Rays of one class for one structure, and the expected answers.
 pub(super) struct Task {
     pub(super) set: RaySet,
     expected: Vec<Vec<Answer>>,
 }
 
-/// A pass is at least this long, seconds.
+/// Minimum duration of a timed pass, in seconds.
 const SHORTEST: f64 = 4e-3;
 
-/// What happens while structures are compared; tells whether to go on.
+/// Callback of a comparison: receives the rows so far and the current step, returns whether to go on.
 pub type GoOn<'a> = dyn FnMut(&[Row], &str) -> bool + 'a;
 
-/// Compares; `filters` are those of the picture. `go_on` hears of every step, with the rows as far as they are; `None` when
-/// it says to stop, or when no threads can be started.
+/// Compares structures; `filters` are those of the picture. `go_on` is called at every step with the rows so far; returns `None`
+/// when it stops the comparison, or when no threads can be started.
 ///
-/// The reference is the first structure that is not slow, or the first of all; the others must agree with it. Where the world
-/// keeps instances all of them must be such that can ([`AccelKind::keeps_instances`]).
+/// The reference is the first structure that is not slow, or else the first of all; the others must agree with it. If the world
+/// keeps instances, every structure must support them ([`AccelKind::keeps_instances`]).
 pub fn compare(
     world: &World,
     filters: Option<&Filters>,
@@ -109,7 +109,7 @@ pub fn compare(
     let candidates = plan.candidates();
     let (whole, sampled) = tasks((world.len(), filters), sets, plan, &candidates, |candidate| build(candidate).0);
 
-    // Each structure once, so that a row is there as soon as possible; then all in turn.
+    // Build and count each structure once, so that a row exists as soon as possible; then time all in turn.
     let mut rows: Vec<Row> = Vec::new();
     let mut structures = Vec::new();
     for candidate in &candidates {
@@ -152,7 +152,7 @@ pub fn compare(
     Some(rows)
 }
 
-/// The rays for structures that get all of them, and for slow ones.
+/// Tasks of structures that get all rays, and of slow ones.
 fn tasks<'s>(
     (prims, filters): (usize, Option<&Filters>),
     sets: &[RaySet],
@@ -178,7 +178,7 @@ impl Task {
     }
 }
 
-/// Counts, and compares every answer with what was expected: those of a counted walk, and those of a plain one.
+/// Counts one task, and checks the answers of both the counted and the plain walk against the expected ones.
 pub(super) fn count<A: Accel>(
     accel: &A,
     filters: Option<&Filters>,
@@ -203,7 +203,7 @@ pub(super) fn count<A: Accel>(
     row
 }
 
-/// How often rays that take `seconds` are asked so that the clock's grain does not matter.
+/// Number of repetitions of a pass that takes `seconds`, so that the resolution of the clock does not matter.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
 fn repeats(seconds: f64) -> u32 {
     (SHORTEST / seconds.max(1e-6)).ceil().clamp(1.0, 1000.0) as u32
@@ -214,7 +214,7 @@ fn differing(counted: &[Answer], plain: &[Answer], expected: &[Answer]) -> u64 {
     triples.filter(|((counted, plain), expected)| counted != expected || plain != expected).count() as u64
 }
 
-/// One timed pass over all classes.
+/// Runs one timed pass over all classes.
 fn time<A: Accel>(accel: &A, filters: Option<&Filters>, tasks: &[Task], threads: usize, rows: &mut [ClassRow]) {
     for (task, row) in tasks.iter().zip(rows) {
         let pass = |batch: &Batch| seconds(accel, filters, batch, row.repeats, threads);
@@ -223,8 +223,8 @@ fn time<A: Accel>(accel: &A, filters: Option<&Filters>, tasks: &[Task], threads:
     }
 }
 
-/// The number of rays after which building a structure has paid: the seconds it takes to build over the seconds it saves
-/// for each ray against testing everything. `None` when it saves none.
+/// Number of rays after which building a structure has paid off: build time over the time saved per ray against testing every
+/// prim. `None` if no time is saved.
 pub fn break_even(build: f64, per_ray: f64, none_per_ray: f64) -> Option<f64> {
     let saved = none_per_ray - per_ray;
     (saved > 0.0 && build.is_finite()).then(|| build / saved)

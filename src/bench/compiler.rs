@@ -1,4 +1,4 @@
-//! Cargo's build script: tells the program by which compiler and with which flags it is built, for its reports.
+//! Cargo's build script: records compiler and flags for the reports.
 
 #![allow(clippy::print_stdout, reason = "this is how Cargo is told")]
 

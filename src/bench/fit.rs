@@ -1,22 +1,22 @@
 //! Power laws fitted to measurements.
 
-/// y = c · x^exponent, by least squares of the logarithms.
+/// Power law y = factor · x^exponent, by least squares of the logarithms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// By it y grows with x: 1 is in proportion, 0 not at all.
+    /// Exponent: 1 for proportional growth, 0 for none.
     pub exponent: f64,
-    /// y at x = 1.
+    /// Value of y at x = 1.
     pub factor: f64,
-    /// Standard error of the exponent; NaN for two points, which lie on every such curve.
+    /// Standard error of the exponent; NaN for two points, which any such curve fits exactly.
     pub error: f64,
     /// Share of the variance of log y that the law explains; NaN where y does not vary.
     pub r2: f64,
-    /// Points that it is fitted to.
+    /// Number of fitted points.
     pub points: usize,
 }
 
 impl Fit {
-    /// Of points (x, y); those that have no logarithm are left out. `None` where fewer than two different x are left.
+    /// Fits points (x, y); those without finite logarithms are left out. `None` with fewer than two different x left.
     pub fn of(points: &[(f64, f64)]) -> Option<Self> {
         let logs = points.iter().map(|&(x, y)| (x.ln(), y.ln()));
         let logs: Vec<(f64, f64)> = logs.filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
@@ -38,7 +38,7 @@ impl Fit {
         })
     }
 
-    /// What ten times x multiply y by.
+    /// Factor by which y grows when x grows tenfold.
     pub fn for_ten_times(&self) -> f64 {
         10f64.powf(self.exponent)
     }
@@ -68,7 +68,7 @@ mod tests {
         assert!(fit.exponent.abs() < 1e-12 && fit.error < 1e-7 && fit.r2.is_nan(), "{fit:?}");
     }
 
-    /// Log y is off the line by +d, −d, −d, +d at even distances: the slope stays, and by hand
+    /// Log y is off the line by +d, −d, −d, +d at even distances: the slope stays, and analytically
     /// error² = (4 d² / 2) / Σ(x − mean)² and 1 − R² = 4 d² / (Σ(x − mean)² + 4 d²).
     #[test]
     fn the_standard_error_is_the_textbooks() {

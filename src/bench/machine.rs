@@ -1,30 +1,30 @@
-//! Where and by what a measurement was made.
+//! Machine and build of a measurement.
 
 use crate::math::simd::Level;
 use crate::threads;
 use std::fs;
 
-/// What times depend on; counts do not.
+/// Properties that times depend on; counts do not.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Machine {
-    /// The processor as it calls itself.
+    /// Name of the processor.
     pub cpu: String,
-    /// Threads that it runs at once, as far as we may use them.
+    /// Number of hardware threads available to the process.
     pub cores: usize,
     /// Operating system and instruction set.
     pub system: String,
-    /// What the kernels found there.
+    /// Instruction set level that the kernels use.
     pub simd: String,
-    /// The compiler.
+    /// Compiler version.
     pub compiler: &'static str,
-    /// How it was told to compile.
+    /// Compiler flags.
     pub flags: &'static str,
-    /// Of meshray.
+    /// Version of meshray.
     pub version: &'static str,
 }
 
 impl Machine {
-    /// This one.
+    /// Describes this machine and build.
     pub fn here() -> Self {
         Self {
             cpu: cpu().unwrap_or_else(|| "unknown".into()),
@@ -37,14 +37,14 @@ impl Machine {
         }
     }
 
-    /// One line.
+    /// Summary in one line.
     pub fn line(&self) -> String {
         let Self { cpu, cores, system, simd, compiler, flags, version } = self;
         format!("meshray {version}, {compiler}, {flags}; {cpu}, {cores} cores, {simd}, {system}")
     }
 }
 
-/// Only Linux tells in a file.
+/// Name of the processor; only Linux offers it in a file.
 fn cpu() -> Option<String> {
     let text = fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find(|l| l.starts_with("model name"))?;

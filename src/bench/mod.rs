@@ -1,5 +1,5 @@
-//! Measures and compares, and prints nothing: rays that are hard on a mesh, exact answers, and what came out; the rays of
-//! a real picture through every structure, and what they cost there.
+//! Measures and compares, but prints nothing: hard rays for a mesh with exact answers, and the rays of a real picture through
+//! every structure with their costs.
 
 pub mod aim;
 pub mod baseline;

@@ -1,9 +1,8 @@
-//! What a ray really hits: exact for the `f32` ray and triangles, from all of them, by arithmetic of its own.
+//! Reference hits of a ray: exact for the `f32` ray and triangles, over all of them, with independent arithmetic.
 //!
-//! Every triangle is looked at in `f64` with bounds of its own; where those cannot tell, adaptive predicates and rational
-//! numbers decide ([`rational`](crate::math::rational)). To be affordable on large meshes, runs of triangles are
-//! skipped when the ray misses their box by more than a millionth of its size: nothing else is shared with the
-//! structures that it judges.
+//! Every triangle is tested in `f64` with error bounds; where those are inconclusive, adaptive predicates and rational numbers
+//! decide ([`rational`](crate::math::rational)). To be affordable on large meshes, runs of triangles are skipped when the ray
+//! misses their bounding box by more than a millionth of its size: nothing else is shared with the structures under test.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -15,45 +14,45 @@ use crate::math::rational::{cross, exact, hit, minus, point};
 use crate::math::triangle::Triangle;
 use crate::math::{DVec3, Vec3};
 
-/// Triangles in one run.
+/// Triangles per run.
 const RUN: usize = 32;
 
 /// Error of a sum of products of differences in `f64`, relative to the sum of its terms' sizes: fewer than 16 roundings.
 const DOUBT: f64 = 16.0 * f64::EPSILON;
 
-/// How much larger a run's box is taken to be, relative to its own and the ray's coordinates.
+/// Margin around a run's bounding box, relative to the coordinates of box and ray.
 const ROOM: f64 = 1e-6;
 
-/// The nearest hit.
+/// Nearest hit.
 #[derive(Clone, Debug)]
 pub struct Truth {
-    /// The triangle; the lowest of those at the same distance.
+    /// Triangle hit; the lowest index of those at the same distance.
     pub prim: u32,
-    /// Its distance, to a relative error of 2⁻⁴⁰.
+    /// Distance, to a relative error of 2⁻⁴⁰.
     pub t: f64,
 }
 
-/// Judges rays over one set of triangles; other prims are not seen.
+/// Finds reference hits over one set of triangles; other prims are ignored.
 #[derive(Clone, Debug)]
 pub struct Oracle<'a> {
     shapes: &'a Shapes,
-    /// Triangles with an area, in runs of neighbours; no ray hits one without. Of copies only the lowest.
+    /// Triangles with an area, in runs of neighbours; no ray hits one without. Of identical triangles only the lowest index.
     prims: Vec<u32>,
-    /// The second lowest copy of triangles that have copies: it is hit by rays that exclude the lowest.
+    /// Second lowest index of identical triangles, by the lowest: rays that exclude the lowest hit it.
     second: HashMap<u32, u32>,
     boxes: Vec<(DVec3, DVec3)>,
 }
 
-/// A hit that may be the nearest.
+/// Possible nearest hit.
 struct Candidate {
     prim: u32,
     t: f64,
-    /// |t − exact| is at most this.
+    /// Bound on |t − exact|.
     error: f64,
 }
 
 impl<'a> Oracle<'a> {
-    /// Over all triangles.
+    /// Oracle over all triangles of `shapes`.
     pub fn new(shapes: &'a Shapes) -> Self {
         let all = 0..u32::try_from(shapes.triangles.len()).unwrap_or(u32::MAX);
         let mut prims: Vec<u32> = all.filter(|&prim| has_area(&shapes.triangle(prim))).collect();
@@ -78,7 +77,7 @@ impl<'a> Oracle<'a> {
         Self { shapes, prims, second, boxes }
     }
 
-    /// The nearest hit in the ray's range.
+    /// Nearest hit in the ray's range.
     pub fn nearest(&self, ray: &Ray) -> Option<Truth> {
         let mut best: Option<Candidate> = None;
         for (run, (lo, hi)) in self.prims.chunks(RUN).zip(&self.boxes) {
@@ -102,12 +101,12 @@ impl<'a> Oracle<'a> {
         best.map(|b| Truth { prim: b.prim, t: b.t })
     }
 
-    /// The distance at which the ray, within its range, meets one triangle.
+    /// Distance at which the ray, within its range, hits one triangle.
     pub fn meets(&self, ray: &Ray, prim: u32) -> Option<f64> {
         self.candidate(ray, prim).map(|c| c.t)
     }
 
-    /// At least the triangles within `radius` of a point, in the maximum norm.
+    /// Triangles within `radius` of a point, in the maximum norm, and possibly more.
     pub fn near(&self, point: Vec3, radius: f32) -> impl Iterator<Item = u32> {
         let (p, radius) = (point.as_dvec3(), f64::from(radius));
         let touches = move |lo: DVec3, hi: DVec3| (lo - radius).cmple(p).all() && (hi + radius).cmpge(p).all();
@@ -147,15 +146,15 @@ impl<'a> Oracle<'a> {
     }
 }
 
-/// The same for all triangles with these corners, in any order.
+/// Key of a triangle by its corners, in any order.
 fn corners(triangle: &Triangle) -> [[u32; 3]; 3] {
-    // Adding 0 makes one zero of two.
+    // Adding 0 turns −0 into +0.
     let mut corners = triangle.map(|p| (p + 0.0).to_array().map(f32::to_bits));
     corners.sort_unstable();
     corners
 }
 
-/// Puts triangles near each other side by side: by cells of a grid, along a curve of G. Morton (1966).
+/// Sorts triangles so that neighbours are adjacent: by grid cells along G. Morton's curve (1966).
 fn sort_by_place(prims: &mut [u32], shapes: &Shapes) {
     let middle = |prim: u32| shapes.triangle(prim).into_iter().map(|p| p.as_dvec3()).sum::<DVec3>() / 3.0;
     let (lo, hi) = prims
@@ -170,7 +169,7 @@ fn sort_by_place(prims: &mut [u32], shapes: &Shapes) {
     prims.sort_by_cached_key(|&prim| cell(prim));
 }
 
-/// Whether the corners do not lie on one line, exactly.
+/// Whether the corners are not collinear, exactly.
 fn has_area(triangle: &Triangle) -> bool {
     let [a, b, c] = triangle.map(|p| p.as_dvec3());
     let axes = [DVec3::X, DVec3::Y, DVec3::Z];
@@ -181,7 +180,7 @@ fn has_area(triangle: &Triangle) -> bool {
     }
 }
 
-/// Whether t is within the range, and not near its ends.
+/// Whether t is certainly within the ray's range, given its error.
 fn certainly_within(ray: &Ray, t: f64, error: f64) -> bool {
     t - error > f64::from(ray.t_min) && t + error < f64::from(ray.t_max)
 }
@@ -195,7 +194,7 @@ enum Verdict {
 fn in_f64(ray: &Ray, triangle: &Triangle) -> Verdict {
     let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
     let [a, b, c] = triangle.map(|p| p.as_dvec3() - o);
-    // The volumes that the line cuts off beyond each edge, doubled and redoubled: their signs say on which side it passes.
+    // Triple products (6 times the signed volumes) of the line and each edge: their signs say on which side the line passes.
     let sides = [(b, c), (c, a), (a, b)].map(|(p, q)| bounded_dot(p, q, d));
     let certain = |s: &(f64, f64), sign: f64| s.0 * sign > s.1;
     if sides.iter().any(|s| certain(s, 1.0)) && sides.iter().any(|s| certain(s, -1.0)) {
@@ -218,8 +217,8 @@ fn in_f64(ray: &Ray, triangle: &Triangle) -> Verdict {
     Verdict::Unknown
 }
 
-/// On which side of the ray each edge passes, by J. R. Shewchuk's adaptive predicate (1997), where the ray's second point
-/// can be given in `f64`.
+/// Sides of the ray on which the edges pass, by J. R. Shewchuk's adaptive predicate (1997); `None` where the ray's second point
+/// is not exact in `f64`.
 fn exact_signs(o: DVec3, d: DVec3, triangle: &Triangle) -> Option<[f64; 3]> {
     let end = o + d;
     if end - o != d || end - d != o {
@@ -230,7 +229,7 @@ fn exact_signs(o: DVec3, d: DVec3, triangle: &Triangle) -> Option<[f64; 3]> {
     Some([(b, c), (c, a), (a, b)].map(|(p, q)| robust::orient3d(coord(o), coord(end), p, q)))
 }
 
-/// (p × q) · v and a bound of its error.
+/// (p × q) · v and a bound on its error.
 fn bounded_dot(p: DVec3, q: DVec3, v: DVec3) -> (f64, f64) {
     let sizes = DVec3::new(
         (p.y * q.z).abs() + (p.z * q.y).abs(),
@@ -240,7 +239,7 @@ fn bounded_dot(p: DVec3, q: DVec3, v: DVec3) -> (f64, f64) {
     (p.cross(q).dot(v), sizes.dot(v.abs()) * DOUBT)
 }
 
-/// Whether the ray may meet the box before `limit`.
+/// Whether the ray may hit the box before `limit`.
 fn may_meet(lo: DVec3, hi: DVec3, ray: &Ray, limit: f64) -> bool {
     let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
     let room = (o.abs().max(lo.abs()).max(hi.abs()).max_element()) * ROOM + f64::from(f32::MIN_POSITIVE);
@@ -260,7 +259,7 @@ fn may_meet(lo: DVec3, hi: DVec3, ray: &Ray, limit: f64) -> bool {
     near <= far && near <= limit
 }
 
-/// How far `t` is from `truth`, in units in the last place of the nearest `f32`.
+/// Distance of `t` from `truth`, in units in the last place of the nearest `f32`.
 pub fn ulps(t: f32, truth: f64) -> f64 {
     #[expect(clippy::cast_possible_truncation, reason = "the float whose spacing is wanted")]
     let nearest = (truth as f32).abs();
@@ -268,7 +267,7 @@ pub fn ulps(t: f32, truth: f64) -> f64 {
     (f64::from(t) - truth).abs() / spacing
 }
 
-/// The exact place of a hit.
+/// Exact position of a hit.
 pub fn place(ray: &Ray, triangle: &Triangle) -> Option<[RBig; 3]> {
     let (o, d) = (point(ray.origin), point(ray.dir));
     let t = hit(&o, &d, triangle)?;
@@ -292,7 +291,7 @@ mod tests {
                 let mut hit = [Hit::MISS];
                 brute.closest(&[ray], &mut hit, &mut (), &mut NoProbe);
                 let truth = oracle.nearest(&ray);
-                // Distances beyond the largest float are hits in rational numbers only.
+                // Distances beyond the largest float are hits in rational arithmetic only.
                 let far = truth.as_ref().is_some_and(|t| t.t > f64::from(f32::MAX));
                 assert!(far || hit[0].is_some() == truth.is_some(), "{name} {ray:?} {truth:?} {hit:?}");
                 if let Some(truth) = truth.filter(|_| !far) {

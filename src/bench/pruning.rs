@@ -1,21 +1,21 @@
-//! What leaving out saves that a scene does not need: one picture rendered with and without it.
+//! Saving of pruning, which leaves out code paths that a scene does not need: one picture rendered with and without it.
 
 use super::clock::{Spread, processor_seconds};
 use crate::render::{Job, render};
 
-/// One picture rendered both ways.
+/// Times of one picture rendered with and without pruning.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pruning {
-    /// Seconds of processor time of a rendering as usual.
+    /// CPU seconds of a pruned rendering.
     pub usual: Spread,
-    /// Seconds with every code path on (`--no-prune`).
+    /// CPU seconds with every code path on (`--no-prune`).
     pub everything: Spread,
-    /// Whether the pixels were the same bits in all renderings.
+    /// Whether all renderings gave bit-identical pixels.
     pub same: bool,
 }
 
 impl Pruning {
-    /// Renders each of two jobs so many times on one thread, in turn. `None` when the thread cannot be started.
+    /// Renders each of the two jobs `passes` times on one thread, alternately. `None` if the thread cannot be started.
     pub fn measure(usual: &Job, everything: &Job, passes: usize) -> Option<Self> {
         let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().ok()?;
         let mut found = Self { same: true, ..Self::default() };
@@ -30,12 +30,12 @@ impl Pruning {
         Some(found)
     }
 
-    /// The part of the time with everything on that leaving out saves; negative where it costs.
+    /// Part of the unpruned time that pruning saves; negative where it costs time.
     pub fn saved(&self) -> f64 {
         1.0 - self.usual.median() / self.everything.median()
     }
 
-    /// What was found, in a sentence.
+    /// Result as a sentence.
     pub fn sentence(&self) -> String {
         use crate::number::seconds;
         let pixels = if self.same { "the pixels are the same" } else { "the pixels DIFFER" };

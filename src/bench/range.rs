@@ -1,21 +1,21 @@
-//! Values as people type them: a list `1,2,5`, or a range `0.5..16` with or without a number of steps, `0.5..16:8`.
+//! Parsing of value lists such as `1,2,5` and ranges such as `0.5..16`, optionally with a number of values: `0.5..16:8`.
 
-/// Most values that one range may stand for.
+/// Maximum number of values.
 pub const MOST: usize = 64;
 
-/// How the values of a range without a number of steps lie.
+/// Spacing of the values of a range without a number of values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spacing {
-    /// The first, ten times that, and so on, and the last.
+    /// The first value, times 10, and so on, and the last value.
     Tens,
-    /// So many with equal ratios.
+    /// This many values with equal ratios.
     Ratio(usize),
-    /// So many with equal differences.
+    /// This many values with equal differences.
     Even(usize),
 }
 
 impl Spacing {
-    /// The same with another number of values; tens become equal ratios.
+    /// The same spacing with another number of values; tens become equal ratios.
     fn with(self, count: usize) -> Self {
         match self {
             Self::Even(_) => Self::Even(count),
@@ -24,7 +24,7 @@ impl Spacing {
     }
 
     fn between(self, from: f64, to: f64) -> Vec<f64> {
-        // Three digits may be too few for values that lie close together.
+        // Rounding to three digits may leave the range when its ends lie close together.
         let rounded = |value: f64| printable(value).clamp(from, to);
         let inner = |count: usize| (1..count - 1).map(move |i| i as f64 / (count - 1) as f64);
         let between: Vec<f64> = match self {
@@ -36,12 +36,12 @@ impl Spacing {
     }
 }
 
-/// Rounded to three digits, so that what a report prints repeats the value.
+/// Rounds to three digits, so that the number printed in a report is the value itself.
 fn printable(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }
 
-/// The values of `text`, ascending, each once; whole ones where `whole` says so. An error says what to write.
+/// Parses the values of `text`, ascending, each once; whole numbers if `whole`. An error says what to write.
 pub fn values(text: &str, spacing: Spacing, whole: bool) -> Result<Vec<f64>, String> {
     let wrong =
         |why: &str| format!("{text:?}: {why}; write values such as 1,2,5 or a range such as 1..100 or 1..100:7");

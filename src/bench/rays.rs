@@ -1,4 +1,4 @@
-//! The rays that structures are compared on: those of a real picture, and one diffuse bounce behind it.
+//! Rays on which structures are compared: those of a real picture, and one diffuse bounce from its primary hits.
 
 use crate::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray};
 use crate::math::Vec3;
@@ -6,26 +6,26 @@ use crate::math::random::Random;
 use crate::render::{Asked, CLASS_NAMES, Job, Question, Tape, World, render_recorded};
 use std::f32::consts::TAU;
 
-/// What sent a ray.
+/// Origin of a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Class {
-    /// The eye.
+    /// Camera ray.
     Primary,
-    /// A point that looks for a light.
+    /// Ray from a surface point to a light.
     Shadow,
-    /// A mirror.
+    /// Mirror reflection.
     Reflected,
-    /// Glass, or whatever else lets light through.
+    /// Refraction in glass, or transmission through another surface.
     Refracted,
-    /// A matt surface, in a direction drawn by the cosine law. The renderer sends no such rays; a path tracer would.
+    /// Bounce off a matt surface, with cosine-weighted directions. The renderer sends no such rays; a path tracer would.
     Diffuse,
 }
 
 impl Class {
-    /// Every class, in the order of reports.
+    /// All classes, in the order of reports.
     pub const ALL: [Self; 5] = [Self::Primary, Self::Shadow, Self::Reflected, Self::Refracted, Self::Diffuse];
 
-    /// As printed.
+    /// Name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Diffuse => "diffuse",
@@ -34,14 +34,14 @@ impl Class {
     }
 }
 
-/// Rays about which the same is asked.
+/// Rays with the same question.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Batch {
-    /// What is asked.
+    /// Question asked of the structure.
     pub question: Question,
-    /// About these.
+    /// Rays of the batch.
     pub rays: Vec<Ray>,
-    /// As many hits as rays where the search goes on behind them; else empty.
+    /// Hits behind which the search continues, one per ray, for [`Question::Next`]; else empty.
     pub after: Vec<Hit>,
 }
 
@@ -51,42 +51,42 @@ impl Batch {
         Self { question, rays: asked.iter().map(|a| a.ray).collect(), after }
     }
 
-    /// The rays at these places.
+    /// Batch of the rays at the given indices.
     pub fn pick(&self, places: &[usize]) -> Self {
         let after = if self.after.is_empty() { Vec::new() } else { places.iter().map(|&i| self.after[i]).collect() };
         Self { question: self.question, rays: places.iter().map(|&i| self.rays[i]).collect(), after }
     }
 }
 
-/// The rays of one class.
+/// Rays of one class.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RaySet {
-    /// What sent them.
+    /// Class of the rays.
     pub class: Class,
-    /// How many the picture asked.
+    /// Number of rays that the picture asked.
     pub asked: u64,
-    /// Those that were kept: all, or an even sample.
+    /// Kept rays: all, or an even sample.
     pub batches: Vec<Batch>,
 }
 
 impl RaySet {
-    /// Rays that were kept.
+    /// Number of kept rays.
     pub fn len(&self) -> usize {
         self.batches.iter().map(|b| b.rays.len()).sum()
     }
 
-    /// Whether none was.
+    /// Whether no ray was kept.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// At most `limit` rays, evenly from all batches, and the places of the rays kept in each batch.
+    /// Samples at most `limit` rays evenly from all batches; also returns the indices of the kept rays in each batch.
     pub fn sample(&self, limit: usize, seed: u64) -> (Self, Vec<Vec<usize>>) {
         let (all, mut seen, mut kept) = (self.len().max(1), 0, 0);
         let limit = limit.min(all);
         let mut share = |batch: &Batch| {
             seen += batch.rays.len();
-            // What is kept of all batches so far, as near below its share as whole rays allow.
+            // Total kept up to this batch: its share of the limit, rounded down.
             let count = seen * limit / all - kept;
             kept += count;
             even_places(batch.rays.len(), count, seed)
@@ -97,7 +97,7 @@ impl RaySet {
     }
 }
 
-/// `count` of `len` places, one drawn from each of as many equal parts: no pattern of the picture can fall into step.
+/// Draws `count` of `len` indices, one from each of `count` equal parts, which avoids aliasing with patterns of the picture.
 fn even_places(len: usize, count: usize, seed: u64) -> Vec<usize> {
     if count >= len {
         return (0..len).collect();
@@ -107,13 +107,13 @@ fn even_places(len: usize, count: usize, seed: u64) -> Vec<usize> {
     (0..count).map(|i| part(i) + random.below(part(i + 1) - part(i))).collect()
 }
 
-/// Renders once and keeps the rays; at most `limit` for each class. Classes without rays are left out. With it the depth
-/// that was used; `None` when the rendering could not be done.
+/// Renders once and records at most `limit` rays per class, leaving out classes without rays. Also returns the depth that was
+/// used; `None` when the rendering failed.
 pub fn record(job: &Job, limit: usize, seed: u64) -> Option<(Vec<RaySet>, u32)> {
     let (rendered, recording) = render_recorded(job, &())?;
     let eye = recording.primary.rays(Question::Closest);
     let diffuse = diffuse(job, eye, seed);
-    // The tape may have kept a part of what the eye sent.
+    // The tape may have kept only some of the primary rays.
     let bounces = diffuse.rays.len() as u64 * recording.primary.total(Question::Closest) / (eye.len() as u64).max(1);
     let mut sets = vec![
         set(Class::Primary, &recording.primary, seed),
@@ -129,7 +129,7 @@ pub fn record(job: &Job, limit: usize, seed: u64) -> Option<(Vec<RaySet>, u32)> 
     Some((sets, rendered.depth))
 }
 
-/// The rays of a class; of each question the same part, that of which the tape has kept the least.
+/// Ray set of a class; every question keeps the same fraction, namely that of the question of which the tape kept the least.
 fn set(class: Class, tape: &Tape, seed: u64) -> RaySet {
     let parts = Question::ALL.map(|q| (tape.rays(q).len() as u64, tape.total(q)));
     let (kept, of) = parts.into_iter().filter(|part| part.1 > 0).fold((1, 1), |least, part| {
@@ -145,7 +145,7 @@ fn set(class: Class, tape: &Tape, seed: u64) -> RaySet {
     RaySet { class, asked: Question::ALL.into_iter().map(|q| tape.total(q)).sum(), batches }
 }
 
-/// One ray from each hit of an eye ray, on the side it was seen from.
+/// One diffuse ray from each hit of a primary ray, on the side that was seen.
 fn diffuse(job: &Job, eye: &[Asked], seed: u64) -> Batch {
     let eye: Vec<Ray> = eye.iter().map(|a| a.ray).collect();
     let mut hits = vec![Hit::MISS; eye.len()];
@@ -156,14 +156,14 @@ fn diffuse(job: &Job, eye: &[Asked], seed: u64) -> Batch {
     Batch { question: Question::Closest, rays, after: Vec::new() }
 }
 
-/// A ray drawn by the cosine law; `None` where a face has no normal.
+/// Cosine-weighted ray from a hit; `None` where the face has no normal.
 fn bounce(world: &World, ray: &Ray, hit: &Hit, random: &mut Random) -> Option<Ray> {
     let refined = world.refine(ray, hit);
     let normal = if refined.normal.dot(ray.dir) > 0.0 { -refined.normal } else { refined.normal };
     if normal == Vec3::ZERO {
         return None;
     }
-    // A point of the unit disc, lifted onto the hemisphere above it (Malley's method).
+    // Sample the unit disc and lift the point onto the hemisphere above it (Malley's method).
     let (square, turn) = (random.unit(), TAU * random.unit());
     let radius = square.sqrt();
     let (tangent, bitangent) = normal.any_orthonormal_pair();

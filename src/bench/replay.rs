@@ -1,4 +1,4 @@
-//! Asking a structure about recorded rays: for the answers, for the counts, for the time.
+//! Replays recorded rays through a structure: for answers, for counts, or for time.
 
 use super::clock::timed;
 use super::rays::Batch;
@@ -7,10 +7,10 @@ use crate::render::{FilterScratch, Filters, Question};
 use crate::threads;
 use std::thread;
 
-/// Rays asked at once, as the renderer does.
+/// Rays per query slice, as in the renderer.
 const SLICE: usize = 256;
 
-/// An answer as bits: t, u, v and prim of a hit, or whether a ray is blocked.
+/// Answer as bits: t, u, v and prim of a hit, or whether the ray is occluded.
 pub type Answer = [u32; 4];
 
 /// Answers all rays of a batch.
@@ -22,7 +22,7 @@ pub fn answers<A: Accel>(accel: &A, filters: Option<&Filters>, batch: &Batch) ->
     answers
 }
 
-/// Answers all rays of a batch one by one and hands over what each one cost.
+/// Answers the rays of a batch one by one and passes the counts of each to `each`.
 pub fn counted<A: Accel>(
     accel: &A,
     filters: Option<&Filters>,
@@ -44,8 +44,8 @@ pub fn counted<A: Accel>(
     answers
 }
 
-/// Seconds for all rays of a batch, asked `times` times, by so many threads that each take an equal share: from before the
-/// first to after the last.
+/// Seconds to answer all rays of a batch `times` times, by `threads` threads with equal shares: from the first start to the last
+/// end.
 pub fn seconds<A: Accel>(accel: &A, filters: Option<&Filters>, batch: &Batch, times: u32, threads: usize) -> f64 {
     let share = batch.rays.len().div_ceil(threads.max(1)).max(1);
     let work = |slices: Vec<Slice>| {
@@ -68,7 +68,7 @@ pub fn seconds<A: Accel>(accel: &A, filters: Option<&Filters>, batch: &Batch, ti
     threads::anywhere(|| timed(together)).1
 }
 
-/// Rays that are asked at once.
+/// Rays of one query.
 struct Slice<'a> {
     question: Question,
     rays: &'a [Ray],
@@ -82,7 +82,7 @@ impl<'a> Slice<'a> {
     }
 }
 
-/// A structure, its scratch, and room for the answers.
+/// A structure with its scratch and answer buffers.
 struct Replayer<'a, A: Accel> {
     accel: &'a A,
     filters: Option<&'a Filters<'a>>,
@@ -105,7 +105,7 @@ impl<'a, A: Accel> Replayer<'a, A> {
         }
     }
 
-    /// The answers stay where they are, so that nothing else is timed.
+    /// Answers the slice but leaves the answers in the buffers, so that nothing else is timed.
     fn ask_only(&mut self, slice: &Slice) {
         self.fill(slice, &mut NoProbe);
         std::hint::black_box((&self.hits, &self.occluded));

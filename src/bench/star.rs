@@ -1,11 +1,11 @@
-//! A closed mesh with faces of all shapes: no ray that starts inside may leave it.
+//! Closed mesh with faces of all shapes: no ray that starts inside may leave it.
 
 use crate::accel::{BitSet, Shapes};
 use crate::math::Vec3;
 use crate::math::random::Random;
 
-/// A closed star-shaped mesh around the origin, of random radius 1 to 1.2, out of 2 · `columns` · (`rows` − 1) opaque
-/// triangles between circles of latitude; at least 3 columns and 2 rows.
+/// Closed star-shaped mesh around the origin, with random radius in 1 to 1.2 and 2 · `columns` · (`rows` − 1) opaque triangles
+/// between circles of latitude; needs at least 3 columns and 2 rows.
 pub fn star(columns: u32, rows: u32) -> Shapes {
     let mut random = Random::new(2);
     let mut vertices = vec![Vec3::Y, Vec3::NEG_Y];

@@ -1,4 +1,4 @@
-//! What can be suspected in a scene, and the scene without it.
+//! Suspected causes of cost in a scene, and the scene without each.
 
 use super::mend::{self, Corners, cut, length, slimness, triangles};
 use super::{Case, Cause, Suspect};
@@ -8,24 +8,24 @@ use crate::render::Settings;
 use crate::scene::features::{Feature, Features};
 use crate::scene::{AlphaMode, Scene};
 
-/// A triangle is huge from this part of the scene's extent on.
+/// Least length of a huge triangle, relative to the scene's extent.
 const HUGE: f64 = 0.25;
-/// It is cut into pieces of this part.
+/// Length that huge triangles are cut to, relative to the scene's extent.
 const PIECE: f64 = 1.0 / 16.0;
-/// A triangle is a sliver when its height is less than this part of its length.
+/// A sliver's height is less than this part of its length.
 const SLIM: f64 = 0.05;
-/// … and not shorter than this part of the scene's extent: short ones hardly make boxes overlap.
+/// Least length of a sliver, relative to the scene's extent: shorter ones hardly make boxes overlap.
 const SHORTEST_SLIVER: f64 = 1.0 / 32.0;
-/// Pieces that triangles are cut into at most.
+/// Maximum number of pieces that triangles are cut into.
 const MOST_PIECES: usize = 1 << 18;
-/// Bounces that are left of mirrors and glass.
+/// Bounce limit in the case without deep mirrors and glass.
 const SHALLOW: u32 = 2;
-/// Cells along an axis in which a cluster is looked for.
+/// Cells per axis of the grid in which clusters are searched.
 const CELLS: usize = 32;
-/// Triangles are crowded when they take up so many times fewer cells than if they were scattered evenly.
+/// Triangles form a cluster when half of them lie in this many times fewer cells than if scattered evenly.
 const CROWDED: usize = 8;
 
-/// All that can be suspected, in the order of [`Cause::ALL`].
+/// All suspected causes of a case, in the order of [`Cause::ALL`].
 pub(super) fn suspects(case: &Case) -> Vec<Suspect> {
     let size = Size::of(&case.scene);
     let found = [
@@ -40,7 +40,7 @@ pub(super) fn suspects(case: &Case) -> Vec<Suspect> {
     found.into_iter().flatten().collect()
 }
 
-/// How large the triangles of a scene are.
+/// Bounding box and number of the triangles of a scene.
 struct Size {
     lo: DVec3,
     hi: DVec3,
@@ -115,15 +115,15 @@ fn shells(case: &Case) -> Option<Suspect> {
     })
 }
 
-/// The structure itself: where it divides space of which a small part holds most triangles, that is named.
+/// Suspects the structure itself; [`Cause::DenseCluster`] if it divides space and a small part of it holds most triangles.
 fn structure(case: &Case, size: &Size) -> Option<Suspect> {
     use AccelKind::{FastBvh, FastOctree, Grid, GridBvh, GridOctree, Octree};
-    // Both fast structures have tight boxes; which of them is better is for `auto` to say.
+    // Both fast structures have tight boxes; choosing between them is up to `auto`.
     if matches!(case.accel, FastBvh | FastOctree) || size.count == 0 {
         return None;
     }
     let (needed, all) = cells_of_half(&case.scene, size);
-    // Half of the triangles, scattered evenly, lie in a cell each, or in half of all cells.
+    // Half of the triangles, scattered evenly, occupy one cell each, or half of all cells.
     let even = (size.count / 2).min(all / 2);
     let divides = matches!(case.accel, Grid | GridOctree | GridBvh | Octree);
     let (cause, evidence) = if divides && needed * CROWDED < even {
@@ -137,7 +137,7 @@ fn structure(case: &Case, size: &Size) -> Option<Suspect> {
     Some(Suspect { cause, evidence, remedy: "--accel fast-bvh".into(), without })
 }
 
-/// The fewest of so many cells of the scene's box that hold the middles of half of the triangles.
+/// Least number of grid cells that hold the centroids of half of the triangles, and the number of all cells.
 fn cells_of_half(scene: &Scene, size: &Size) -> (usize, usize) {
     let mut cells = vec![0usize; CELLS * CELLS * CELLS];
     let scale = (size.hi - size.lo).max(DVec3::splat(size.extent() * 1e-9)).recip() * CELLS as f64;

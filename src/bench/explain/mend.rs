@@ -1,13 +1,13 @@
-//! Scenes with their faults mended, as far as the cost of rays is concerned.
+//! Repairs scenes as far as the cost of rays is concerned.
 
 use crate::math::DVec3;
 use crate::scene::{Instance, Mesh, Scene};
 use std::collections::HashSet;
 
-/// The corners of a triangle in the world.
+/// Corners of a triangle in world space.
 pub(super) type Corners = [DVec3; 3];
 
-/// Every triangle of every instance.
+/// Triangles of all instances, in world space.
 pub(super) fn triangles(scene: &Scene) -> impl Iterator<Item = Corners> {
     scene.instances.iter().flat_map(|instance| {
         let mesh = &scene.meshes[instance.mesh as usize];
@@ -19,19 +19,19 @@ fn corners(mesh: &Mesh, instance: &Instance, triangle: &[u32; 3]) -> Corners {
     triangle.map(|i| instance.world_from_object.transform_point3(mesh.positions[i as usize].as_dvec3()))
 }
 
-/// The longest edge of a triangle.
+/// Length of the longest edge of a triangle.
 pub(super) fn length([a, b, c]: &Corners) -> f64 {
     (*b - *a).length().max((*c - *b).length()).max((*a - *c).length())
 }
 
-/// Its height over that edge, as a part of it: 0.87 at most, near 0 for slivers.
+/// Height of a triangle over its longest edge, divided by that edge: 0.87 at most, near 0 for slivers.
 pub(super) fn slimness(corners: &Corners) -> f64 {
     let [a, b, c] = *corners;
     (b - a).cross(c - a).length() / length(corners).powi(2).max(f64::MIN_POSITIVE)
 }
 
-/// The scene in which every triangle for which `limit` gives a length is cut until no edge is longer: of each instance those
-/// that are so large where it stands. At most `most` pieces are made.
+/// Copies the scene with every triangle for which `limit` returns a length cut until no edge is longer. Triangles are judged per
+/// instance, in world space. Once `most` pieces are made, the rest stays whole.
 pub(super) fn cut(scene: &Scene, limit: impl Fn(&Corners) -> Option<f64>, most: usize) -> Scene {
     let mut mended = scene.clone();
     let mut made = 0;
@@ -56,14 +56,14 @@ pub(super) fn cut(scene: &Scene, limit: impl Fn(&Corners) -> Option<f64>, most: 
             made += own.triangles.len() - before;
         }
         own.face_of_triangle.clear();
-        // Others of its mesh may be of another size.
+        // Other instances of the mesh may have another scale.
         mended.instances[i].mesh = u32::try_from(mended.meshes.len()).unwrap_or(u32::MAX);
         mended.meshes.push(own);
     }
     mended
 }
 
-/// Halves a triangle at its longest edge until no edge is longer than `limit`, and puts the pieces into the mesh.
+/// Halves a triangle at its longest edge until no edge is longer than `limit`, and appends the pieces to the mesh.
 fn halve(triangle: [u32; 3], placed: Corners, limit: f64, mesh: &mut Mesh) {
     let edges = [0, 1, 2].map(|k| (placed[(k + 1) % 3] - placed[k]).length());
     let k = (0..3).max_by(|&a, &b| edges[a].total_cmp(&edges[b])).unwrap_or(0);
@@ -79,7 +79,7 @@ fn halve(triangle: [u32; 3], placed: Corners, limit: f64, mesh: &mut Mesh) {
     halve([middle, b, c], [place, place_b, place_c], limit, mesh);
 }
 
-/// A new vertex halfway between two, with what both say.
+/// Appends a vertex halfway between two, with interpolated attributes, and returns its index.
 fn halfway(mesh: &mut Mesh, a: u32, b: u32) -> u32 {
     let number = u32::try_from(mesh.positions.len()).unwrap_or(u32::MAX);
     let (a, b) = (a as usize, b as usize);
@@ -102,8 +102,8 @@ fn halfway(mesh: &mut Mesh, a: u32, b: u32) -> u32 {
     number
 }
 
-/// The scene without triangles that are hidden by one before them, and how many they were: opaque ones that stand on the same
-/// three points, look to the same side or are seen from both, and are of the same material.
+/// Copies the scene without duplicate triangles, and returns how many were dropped. Duplicates are opaque, have the same three
+/// corners and equal materials, and face the same side or are double-sided.
 pub(super) fn without_copies(scene: &Scene) -> (Scene, usize) {
     let like: Vec<_> =
         scene.materials.iter().map(|one| scene.materials.iter().position(|other| other == one)).collect();
@@ -121,7 +121,7 @@ pub(super) fn without_copies(scene: &Scene) -> (Scene, usize) {
         own.face_of_triangle.clear();
         own.triangles.retain(|triangle| {
             let mut key = corners(mesh, instance, triangle).map(|p| (p + 0.0).to_array().map(f64::to_bits));
-            // The least corner first: what is left of the order is the side it looks to.
+            // Rotate the least corner to the front: the order of the other two then gives the facing side.
             let least = (0..3).min_by_key(|&k| key[k]).unwrap_or(0);
             key.rotate_left(least);
             let front = !both_sides && (key[1] < key[2]) != mirrored;

@@ -1,7 +1,7 @@
-//! Why a mesh costs what it costs: each cause that can be suspected is taken away, and what that saves is counted.
+//! Explains the cost of a mesh: each suspected cause is removed, and the saving is counted.
 //!
-//! A small picture is rendered as it is and once more without each suspected cause. Cost is the sum of ray/prim tests, of
-//! nodes and cells visited, and of points transformed, of all rays: it depends on neither the machine nor the number of threads.
+//! A small picture is rendered unchanged and once more without each suspected cause. Cost is the sum of ray/prim tests, visited
+//! nodes and cells, and transformed points of all rays: it depends on neither the machine nor the number of threads.
 
 mod causes;
 mod mend;
@@ -17,41 +17,41 @@ use std::fmt;
 /// A picture whose cost is to be explained.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// With its lights.
+    /// Scene with its lights.
     pub scene: Scene,
-    /// Seen from here.
+    /// Camera.
     pub view: View,
-    /// Few pixels will do.
+    /// Render settings; few pixels suffice.
     pub settings: Settings,
-    /// The structure.
+    /// Acceleration structure.
     pub accel: AccelKind,
-    /// Its parameters.
+    /// Parameters of the structure.
     pub params: AccelParams,
 }
 
-/// What can make a picture cost more than it should.
+/// Possible cause of avoidable cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Cause {
-    /// A few huge triangles that lie in many cells or boxes.
+    /// A few huge triangles that overlap many cells or boxes.
     HugeTriangles,
     /// Most prims lie in a small part of the space that the structure divides.
     DenseCluster,
-    /// Another structure has less to do.
+    /// Structure that does more work than another would.
     Structure,
-    /// Triangles that stand on the same corners as others.
+    /// Triangles that share their corners with others.
     Shells,
-    /// Long thin triangles, whose boxes are mostly empty.
+    /// Long thin triangles, whose bounding boxes are mostly empty.
     Slivers,
-    /// Surfaces that rays go on behind: alpha masks and blending.
+    /// Surfaces that rays pass through: alpha masks and blending.
     AlphaCards,
-    /// Rays that are bent and mirrored many times.
+    /// Rays that are refracted and reflected many times.
     Depth,
     /// Shadow rays to many lights.
     Lights,
 }
 
 impl Cause {
-    /// All of them.
+    /// All causes, in the order of suspicion.
     pub const ALL: [Self; 8] = [
         Self::HugeTriangles,
         Self::DenseCluster,
@@ -63,7 +63,7 @@ impl Cause {
         Self::Lights,
     ];
 
-    /// As printed.
+    /// Name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::HugeTriangles => "huge triangles",
@@ -77,7 +77,7 @@ impl Cause {
         }
     }
 
-    /// Whether the picture stays what it is without the cause.
+    /// Whether the picture is unchanged without the cause.
     pub const fn keeps_the_picture(self) -> bool {
         matches!(self, Self::HugeTriangles | Self::DenseCluster | Self::Structure | Self::Shells | Self::Slivers)
     }
@@ -89,16 +89,16 @@ impl fmt::Display for Cause {
     }
 }
 
-/// What rendering a picture took.
+/// Work of rendering a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Rays asked.
+    /// Rays traced.
     pub rays: u64,
     /// Ray/prim tests.
     pub tests: u64,
     /// Nodes and cells visited.
     pub steps: u64,
-    /// Points transformed, which is what `transform` does for each prim before it tests it.
+    /// Points transformed; the structure `transform` does so for each prim before its test.
     pub transforms: u64,
 }
 
@@ -107,7 +107,7 @@ impl Work {
         Self { rays: counts.queries, tests: counts.n_it, steps: counts.n_ts, transforms: counts.n_xf }
     }
 
-    /// Tests, steps and transforms together.
+    /// Cost: sum of tests, steps and transforms.
     pub fn cost(&self) -> u64 {
         self.tests + self.steps + self.transforms
     }
@@ -122,12 +122,12 @@ impl Work {
     }
 }
 
-/// The work of a picture, by ray class: primary, shadow, reflected, refracted.
+/// Work of a picture by ray class: primary, shadow, reflected, refracted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Bill(pub [Work; 4]);
 
 impl Bill {
-    /// Renders a case and counts.
+    /// Renders a case and counts its work.
     pub fn of(case: &Case) -> Self {
         let world = World::new(&case.scene);
         let accel = AnyAccel::build(case.accel, &world.shapes, &case.params);
@@ -138,53 +138,53 @@ impl Bill {
         Self([primary, shadow, reflected, refracted].map(|class| Work::of(&class)))
     }
 
-    /// The cost of so many rays of each class.
+    /// Cost scaled to the given number of rays of each class.
     fn cost_of(&self, rays: &[u64; 4]) -> f64 {
         let cost = |(work, &rays): (&Work, &u64)| work.cost() as f64 * rays as f64 / work.rays.max(1) as f64;
         self.0.iter().zip(rays).map(cost).sum()
     }
 
-    /// Of all classes.
+    /// Work of all classes together.
     pub fn sum(&self) -> Work {
         self.0.iter().copied().fold(Work::default(), Work::join)
     }
 }
 
-/// A suspected cause, and the case without it.
+/// Suspected cause, and the case without it.
 #[derive(Clone, Debug)]
 pub struct Suspect {
-    /// Which.
+    /// Suspected cause.
     pub cause: Cause,
-    /// What was seen, with numbers.
+    /// Observation that raises the suspicion, with numbers.
     pub evidence: String,
-    /// The flag or the change of the mesh that gets the saving.
+    /// Flag or change of the mesh that gains the saving.
     pub remedy: String,
-    /// The same picture without it.
+    /// Case without the cause.
     pub without: Case,
 }
 
-/// What a cause costs.
+/// Counted cost of a suspected cause.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// Which.
+    /// Suspected cause.
     pub cause: Cause,
-    /// What was seen, with numbers.
+    /// Observation that raises the suspicion, with numbers.
     pub evidence: String,
-    /// The flag or the change of the mesh that gets the saving.
+    /// Flag or change of the mesh that gains the saving.
     pub remedy: String,
-    /// What the picture takes without it.
+    /// Work of the picture without the cause.
     pub without: Bill,
-    /// The part of the cost that is saved, counted; negative where it grows. Where the picture stays what it is, of as many rays
-    /// of each class.
+    /// Saved part of the counted cost; negative where it grows. If the picture is unchanged, costs are compared for equal numbers
+    /// of rays of each class.
     pub saving: f64,
-    /// Whether the picture stays what it is but for what rough surfaces scatter, which is drawn anew: some of the saving is
-    /// chance then.
+    /// Whether the picture is unchanged except for the random scattering of rough surfaces, which is drawn anew: part of the
+    /// saving is then chance.
     pub is_drawn_anew: bool,
 }
 
 impl Finding {
     fn of(usual: &Bill, without: Bill, Suspect { cause, evidence, remedy, .. }: Suspect) -> Self {
-        /// One ray of so many is another where a place is rounded in another way.
+        /// Up to one ray in this many differs where a position is rounded differently.
         const ROUNDED: u64 = 500;
         let rays = usual.0.map(|work| work.rays);
         let keeps = cause.keeps_the_picture();
@@ -195,23 +195,23 @@ impl Finding {
         Self { cause, evidence, remedy, without, saving, is_drawn_anew }
     }
 
-    /// Whether so much is saved that it matters, and is not chance alone.
+    /// Whether the saving is large enough to matter and is not chance alone.
     pub fn is_worth_it(&self) -> bool {
-        /// What rays that are drawn anew have been seen to change.
+        /// Largest change observed from rays that were merely drawn anew.
         const CHANCE: f64 = 0.1;
         self.saving >= if self.is_drawn_anew { CHANCE } else { WORTH }
     }
 }
 
-/// The least saving that is told.
+/// Least saving worth reporting.
 pub const WORTH: f64 = 0.02;
 
-/// Everything that can be suspected in a case.
+/// All suspected causes in a case.
 pub fn suspects(case: &Case) -> Vec<Suspect> {
     causes::suspects(case)
 }
 
-/// The cost of a case, and what each suspected cause has in it, the greatest saving first.
+/// Returns the work of a case and the share of each suspected cause, greatest saving first; `None` when `go_on` returns false.
 pub fn explain(case: &Case, mut go_on: impl FnMut(Cause) -> bool) -> Option<(Bill, Vec<Finding>)> {
     let usual = Bill::of(case);
     let mut findings = Vec::new();

@@ -1,4 +1,4 @@
-//! One cause at a time, and whether it is found.
+//! Scenes with one cause each, which must be found.
 
 use super::*;
 use crate::generate::Family;
@@ -7,7 +7,7 @@ use crate::math::{DAffine3, DVec3, Vec3, Vec4};
 use crate::render::view::Lens;
 use crate::scene::{AlphaMode, Falloff, Instance, Light, LightKind, Material, Mesh, MetalRough, Reflection};
 
-/// A ball of about 2 `side`² triangles.
+/// Sphere of about 2 `side`² triangles.
 fn ball(center: Vec3, radius: f32, side: u32) -> Mesh {
     let mut mesh = Mesh::default();
     let point = |i: u32, j: u32| {
@@ -46,7 +46,7 @@ fn matt() -> Material {
     }
 }
 
-/// Meshes of one material each, and one light.
+/// Scene of meshes with one material each, and one light.
 fn scene(parts: Vec<(Mesh, Material)>) -> Scene {
     let mut scene = Scene::default();
     for (mesh, material) in parts {
@@ -65,7 +65,7 @@ fn lamp(position: DVec3, intensity: f32) -> Light {
     Light { name: String::new(), intensity: Vec3::splat(intensity), kind, shadows: true, size: 0.0 }
 }
 
-/// The scene from outside, in a few pixels.
+/// Case that views the scene from outside, in few pixels.
 fn case(scene: Scene, accel: AccelKind) -> Case {
     let bounds = crate::scene::framing::robust_bounds(&scene);
     let eye = bounds.center() + DVec3::new(0.4, -1.0, 0.5).normalize() * bounds.radius() * 2.6;
@@ -74,7 +74,7 @@ fn case(scene: Scene, accel: AccelKind) -> Case {
     Case { scene, view, settings, accel, params: AccelParams::DEFAULT }
 }
 
-/// Finds the cause first, with the saving that a picture of four times as many pixels has without it.
+/// Asserts that `cause` comes first, and that its saving predicts that of a picture of four times as many pixels.
 #[track_caller]
 fn assert_is_explained_by(case: &Case, cause: Cause) -> Finding {
     let (usual, findings) = explain(case, |_| true).unwrap();
@@ -107,7 +107,7 @@ fn huge_triangles_among_small_ones_are_found() {
 fn a_cluster_in_a_large_box_is_found_and_the_hierarchy_recommended() {
     let mut stadium = Family::Stadium.scene(3000);
     stadium.lights.push(lamp(DVec3::Z * 100.0, 1.0));
-    // Seen as somebody does who cares for the small thing.
+    // View as chosen by somebody interested in the small object.
     let mut case = case(stadium, AccelKind::Grid);
     case.view = View::look_at(DVec3::new(0.0, -4.0, 3.0), DVec3::ZERO, DVec3::Z, Lens::perspective(0.4));
     let found = assert_is_explained_by(&case, Cause::DenseCluster);

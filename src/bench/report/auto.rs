@@ -1,4 +1,4 @@
-//! What `auto` would choose for a model, and whether that was right on its rays.
+//! Choice of `auto` for a model, and whether it was right for the model's rays.
 
 use std::iter;
 
@@ -9,26 +9,26 @@ use crate::accel::auto::{Why, nodes};
 use crate::bench::row::Row;
 use crate::number::grouped;
 
-/// How the choice fared against the other fast structure. Shares are of the chosen one's cost, by which the other's is
-/// more; below 0 the choice lost.
+/// Comparison of the choice with the other fast structure. Shares are the other's extra cost relative to the chosen one's;
+/// negative where the choice lost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
-    /// What was chosen.
+    /// Chosen structure.
     pub chosen: AccelKind,
-    /// What else could have been.
+    /// The alternative.
     pub other: AccelKind,
-    /// Share of the time of a ray; `None` without times.
+    /// Extra time per ray; `None` without times.
     pub time: Option<f64>,
-    /// Share of the nodes of a ray, as `auto` counts them.
+    /// Extra nodes per ray, as `auto` counts them.
     pub nodes: f64,
-    /// What makes the times doubtful, to be added to a sentence.
+    /// Reason to doubt the times, to be appended to a sentence; empty without doubt.
     doubt: &'static str,
-    /// Whether both are the same tree, whatever the clock says.
+    /// Whether both structures are the same tree, whatever the times are.
     one_tree: bool,
 }
 
 impl Outcome {
-    /// Of the choice for a model; `None` where one of the two was not measured.
+    /// Outcome for a model; `None` where one of the two structures was not measured.
     pub fn of(report: &Report, model: &Model) -> Option<Self> {
         let chosen = model.auto?.kind;
         let other = match chosen {
@@ -38,7 +38,7 @@ impl Outcome {
         let row = |kind| model.rows.iter().find(|r| r.kind == kind && r.setting.is_none());
         let (ours, theirs) = (row(chosen)?, row(other)?);
         let share = |cost: &dyn Fn(&Row) -> f64| match (cost(theirs), cost(ours)) {
-            // Rays that come near nothing.
+            // Rays that come near no prim cost 0 in both.
             (theirs, ours) if theirs == ours => 0.0,
             (theirs, ours) => theirs / ours - 1.0,
         };
@@ -52,13 +52,13 @@ impl Outcome {
         })
     }
 
-    /// Whether the choice was the better one, by time where there is one; `None` where that cannot be told apart.
+    /// Whether the choice was the better one, by time if measured, else by nodes; `None` where the difference is not significant.
     pub fn is_right(&self) -> Option<bool> {
         let certain = self.one_tree || self.time.is_none() || self.doubt.is_empty();
         certain.then(|| self.one_tree || is_no_loss(self.time.unwrap_or(self.nodes)))
     }
 
-    /// Whether the choice was the better one, and by how much.
+    /// Says whether the choice was the better one, and by how much.
     pub fn sentence(&self) -> String {
         let Self { other, nodes, doubt, .. } = self;
         if self.one_tree {
@@ -79,29 +79,29 @@ impl Outcome {
     }
 }
 
-/// A difference of nothing is no loss.
+/// Whether the choice did not lose; differences that round to nothing are no loss.
 fn is_no_loss(share: f64) -> bool {
     share > -5e-4
 }
 
-/// A share as `3.1 % more` or `3.1 % less`.
+/// Formats a share as `3.1 % more` or `3.1 % less`.
 fn more(share: f64) -> String {
     let word = if is_no_loss(share) { "more" } else { "less" };
     format!("{:.1} % {word}", 100.0 * share.abs())
 }
 
-/// What `auto` counts, for an average ray of the picture.
+/// Node cost as `auto` counts it, for an average ray of the picture.
 fn counted(model: &Model, row: &Row) -> f64 {
     model.mean(row, |class| nodes(&class.counts))
 }
 
-/// Whether two structures have the same tree, by everything that is counted of it and in it.
+/// Whether two structures have the same tree, judged by all counts of its parts and of its walks.
 fn is_one_tree(a: &Row, b: &Row) -> bool {
     let alike = a.classes.iter().zip(&b.classes).all(|(a, b)| a.counts == b.counts);
     a.made_of == b.made_of && a.rays() == b.rays() && alike
 }
 
-/// What `auto` would choose, why, and how that fared; empty where it was not asked.
+/// Sentences on what `auto` would choose, why, and how that fared; empty if `auto` was not evaluated.
 pub fn sentences(report: &Report, model: &Model) -> Vec<String> {
     let Some(reason) = model.auto else { return Vec::new() };
     let outcome = match Outcome::of(report, model) {
@@ -112,7 +112,7 @@ pub fn sentences(report: &Report, model: &Model) -> Vec<String> {
     iter::once(format!("auto would choose {reason}")).chain(outcome).collect()
 }
 
-/// The choices over growing sizes, and what the other fast structure costs there; `None` where nothing was asked.
+/// Choices of `auto` over growing sizes, with the extra cost of the other fast structure; `None` if `auto` was not evaluated.
 pub fn over_sizes(report: &Report) -> Option<Table> {
     let line = |model: &Model| {
         let (kind, outcome) = (model.auto?.kind, Outcome::of(report, model));

@@ -1,4 +1,4 @@
-//! What a structure costs, as one number of one kind.
+//! Kinds of cost of a structure, each as one number.
 
 use super::{Model, Report};
 use crate::accel::Count;
@@ -6,26 +6,26 @@ use crate::bench::rays::Class;
 use crate::bench::row::Row;
 use crate::number::{bytes, seconds, short};
 
-/// Something that is better low.
+/// Measure of cost: lower is better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cost {
-    /// Ray/prim tests a ray.
+    /// Ray/prim tests per ray.
     Tests,
-    /// Nodes and cells visited a ray.
+    /// Nodes and cells visited per ray.
     Visits,
-    /// Seconds of a ray.
+    /// Seconds per ray.
     Time,
-    /// Bytes of the structure.
+    /// Size of the structure in bytes.
     Memory,
-    /// Seconds to build.
+    /// Build time in seconds.
     Build,
 }
 
 impl Cost {
-    /// Every cost, in the order of reports.
+    /// All costs, in the order of reports.
     pub const ALL: [Self; 5] = [Self::Tests, Self::Visits, Self::Time, Self::Memory, Self::Build];
 
-    /// As the columns and keys of reports have it.
+    /// Name in columns and keys of reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Tests => "n_it",
@@ -36,7 +36,7 @@ impl Cost {
         }
     }
 
-    /// In words.
+    /// Title in words.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Tests => "Ray/prim tests a ray (n_it)",
@@ -47,7 +47,7 @@ impl Cost {
         }
     }
 
-    /// A value with its unit.
+    /// Formats a value with its unit.
     pub fn shown(self, value: f64) -> String {
         match self {
             _ if !value.is_finite() => "-".into(),
@@ -58,17 +58,17 @@ impl Cost {
         }
     }
 
-    /// Whether it needs a timed pass.
+    /// Whether the cost needs a timed pass.
     pub fn is_time(self) -> bool {
         matches!(self, Self::Time | Self::Build)
     }
 
-    /// Whether each class of rays has its own.
+    /// Whether the cost differs by ray class.
     pub fn is_by_class(self) -> bool {
         matches!(self, Self::Tests | Self::Visits | Self::Time)
     }
 
-    /// Of one structure, for an average ray of one class or of all as they were recorded; NaN where nothing was measured.
+    /// Cost of one structure, for an average ray of one class or of all classes as recorded; NaN where not measured.
     pub fn of(self, model: &Model, row: &Row, class: Option<Class>) -> f64 {
         let place = class.map(|class| model.rays.iter().position(|r| r.class == class));
         let count = |count: Count| match place {
@@ -79,7 +79,7 @@ impl Cost {
             Self::Tests => count(Count::It),
             Self::Visits => count(Count::Ts),
             Self::Memory => row.made_of.bytes as f64,
-            // What builds nothing takes no time that a clock could tell.
+            // A structure that builds nothing has no measurable build time.
             Self::Build if row.made_of.bytes == 0 => f64::NAN,
             Self::Build => row.build.median(),
             Self::Time => match place {
@@ -90,7 +90,7 @@ impl Cost {
     }
 }
 
-/// Costs that the report knows.
+/// Costs that the report contains.
 pub fn costs(report: &Report) -> impl Iterator<Item = Cost> {
     let is_timed = report.is_timed();
     Cost::ALL.into_iter().filter(move |c| is_timed || !c.is_time())

@@ -1,7 +1,7 @@
-//! One line for each model, structure and class of rays; what was not measured is empty.
+//! CSV report: one line per model, structure and ray class; values that were not measured are empty.
 //!
-//! Where the models are a family in growing sizes, columns `e_…` are the exponents of that structure and class over all
-//! sizes; the same on the lines of all sizes. Where a parameter is swept, `value` is that of the structure.
+//! For a family of models in growing sizes, columns `e_…` are the exponents of that structure and class over all sizes, repeated
+//! for every size. For a parameter sweep, `value` is that of the structure.
 
 use super::cost::Cost;
 use super::growth::Curve;
@@ -14,7 +14,7 @@ const COLUMNS: &str = "file,prims,structure,class,rays,asked,sampled,differing,t
                        threads,passes,seed,version,compiler,flags,cpu,e_n_it,e_n_ts,e_t_tr,e_bytes,e_t_b,\
                        parameter,value,is_default,objects";
 
-/// The whole table; `t_b` in seconds, `mrays` in millions of rays a second.
+/// Writes the whole table; `t_b` in seconds, `mrays` in millions of rays per second.
 pub fn write(report: &Report) -> String {
     let mut text = format!("{COLUMNS}\n");
     for model in &report.models {
@@ -58,7 +58,7 @@ fn number(x: f64) -> String {
     if x.is_finite() { x.to_string() } else { String::new() }
 }
 
-/// As RFC 4180 has it.
+/// Quotes a field as in RFC 4180.
 fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
 }

@@ -1,4 +1,4 @@
-//! How the cost of each structure grows with the number of prims, over the models of a report.
+//! Growth of each structure's cost with the number of prims, over the models of a report.
 
 use super::auto::over_sizes;
 use super::cost::{Cost, costs};
@@ -13,16 +13,16 @@ use crate::number::{grouped, seconds, short};
 /// One cost of one structure over all models.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// Of which structure.
+    /// Structure.
     pub kind: AccelKind,
-    /// Prims and cost, as the models come; where there is none, it is left out.
+    /// Number of prims and cost, in the order of the models; models without a value are left out.
     pub points: Vec<(f64, f64)>,
-    /// Where there are two sizes at least.
+    /// Fitted power law; `None` with fewer than two different sizes.
     pub fit: Option<Fit>,
 }
 
 impl Curve {
-    /// Of the models that have a row of this kind.
+    /// Curve over the models that have a row of this kind.
     pub fn of(models: &[Model], kind: AccelKind, cost: Cost, class: Option<Class>) -> Self {
         let point = |model: &Model| {
             let row = model.rows.iter().find(|r| r.kind == kind)?;
@@ -33,7 +33,7 @@ impl Curve {
         Self { kind, fit: Fit::of(&points), points }
     }
 
-    /// The exponent and its standard error: `0.33 ±0.02`; `-` where nothing could be fitted.
+    /// Exponent and standard error: `0.33 ±0.02`; `-` without a fit.
     pub fn exponent(&self) -> String {
         match self.fit {
             None => "-".into(),
@@ -42,25 +42,25 @@ impl Curve {
         }
     }
 
-    /// The exponent alone: `0.33`; nothing where nothing could be fitted.
+    /// Exponent alone: `0.33`; empty without a fit.
     pub fn short_exponent(&self) -> String {
-        // What would be shown as -0.00 is 0.
+        // Avoid a negative zero.
         let shown = |x: f64| format!("{:.2}", if x.abs() < 0.005 { 0.0 } else { x });
         self.fit.map_or(String::new(), |fit| shown(fit.exponent))
     }
 }
 
-/// Structures of which there is a row at all, in the order of the plan.
+/// Structures with at least one row, in the order of the plan.
 pub fn kinds(report: &Report) -> Vec<AccelKind> {
     let has = |kind: &AccelKind| report.models.iter().any(|m| m.rows.iter().any(|r| r.kind == *kind));
     report.plan.kinds.iter().copied().filter(has).collect()
 }
 
-/// Most sizes in the columns of a table.
+/// Maximum number of sizes shown in a table.
 const COLUMNS: usize = 6;
 
-/// A table for each cost: structures down, sizes across, then the exponent and what ten times the prims multiply the cost
-/// by. Of many sizes some are left out. Last, what `auto` would choose.
+/// One table per cost: structures as rows, sizes as columns, then the exponent and the factor for ten times the prims. Only
+/// [`COLUMNS`] sizes are shown. The last table has the choices of `auto`.
 pub fn tables(report: &Report) -> Vec<Table> {
     let models = &report.models;
     let shown: Vec<&Model> = match models.len() {
@@ -91,7 +91,7 @@ pub fn tables(report: &Report) -> Vec<Table> {
     costs(report).map(table).chain(over_sizes(report)).collect()
 }
 
-/// What somebody should know who reads one paragraph only, a sentence each.
+/// Summary in a few sentences.
 pub fn sentences(report: &Report) -> Vec<String> {
     let (Some(first), Some(last)) = (report.models.first(), report.models.last()) else { return Vec::new() };
     let mut said = Vec::new();
@@ -133,7 +133,7 @@ pub fn sentences(report: &Report) -> Vec<String> {
     said
 }
 
-/// How the exponents were found, and what the star is.
+/// Explains the exponents and the star.
 pub const METHOD: &str = "exponent e of cost ~ N^e, N prims: least squares of the logarithms over all sizes, ± standard \
                           error; rays of all classes as they were recorded; N × 10: the cost of \
                           ten times the prims; * an even sample of the rays";

@@ -1,4 +1,4 @@
-//! Schema `meshray-bench/1`: one JSON object.
+//! JSON report of schema `meshray-bench/1`: one object.
 //!
 //! | key | what |
 //! |---|---|
@@ -48,10 +48,10 @@ use crate::render::View;
 use crate::render::view::Lens;
 use serde_json::{Map, Value, json};
 
-/// The name of the schema.
+/// Name of the schema.
 pub const SCHEMA: &str = "meshray-bench/1";
 
-/// The report, indented.
+/// Writes the report as indented JSON.
 pub fn write(report: &Report) -> String {
     let (m, p) = (&report.machine, &report.plan);
     let value = json!({
@@ -187,7 +187,7 @@ fn spread(spread: &Spread) -> Value {
     json!({ "median": spread.median(), "min": spread.min(), "max": spread.max(), "passes": spread.len() })
 }
 
-/// JSON knows no infinity.
+/// Number, or null for NaN and infinity, which JSON lacks.
 fn number(x: f64) -> Value {
     if x.is_finite() { json!(x) } else { Value::Null }
 }

@@ -1,8 +1,8 @@
-//! Tables for a document.
+//! Markdown report.
 
 use super::{Model, Report, WORDS, auto, growth, sweep, tables};
 
-/// The whole report.
+/// Writes the whole report.
 pub fn write(report: &Report) -> String {
     let mut out = String::from("# meshray bench\n");
     if let Some(family) = report.family {
@@ -20,7 +20,7 @@ pub fn write(report: &Report) -> String {
     out
 }
 
-/// Names of files and cameras are not trusted: what steers a terminal is left out.
+/// Replaces control characters: names of files and cameras are not trusted not to contain terminal escapes.
 fn printable(name: &str) -> String {
     name.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }

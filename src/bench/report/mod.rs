@@ -1,4 +1,4 @@
-//! What a comparison found, and how it is shown: as text, JSON, CSV, Markdown or a page for a browser.
+//! Results of a comparison, shown as text, JSON, CSV, Markdown or HTML.
 
 pub mod auto;
 pub mod cost;
@@ -25,87 +25,87 @@ use crate::number::{grouped, so_many};
 use crate::render::View;
 use std::path::Path;
 
-/// All models of one command.
+/// Results of all models of one command.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// Where it was made.
+    /// Machine and build of the measurement.
     pub machine: Machine,
-    /// How.
+    /// Settings of the comparison.
     pub plan: Plan,
-    /// In the order they were measured; the last one's rows may be missing while it is under way.
+    /// Models in the order of measurement; rows of the last one may be missing while it is under way.
     pub models: Vec<Model>,
-    /// What the models are, where they are one family in growing sizes.
+    /// Family of the models, if they are one family in growing sizes.
     pub family: Option<Family>,
-    /// What the brightest colour of heat maps stands for; `None`: the most tests of any pixel.
+    /// Count at the brightest colour of heat maps; `None`: the maximum of all pixels.
     pub heatmap_max: Option<u32>,
-    /// Two structures for the difference image; `None`: the fast ones, or the first two.
+    /// Two structures for the difference image; `None`: the fast ones, or else the first two.
     pub compare: Option<[AccelKind; 2]>,
-    /// Whether everything is done.
+    /// Whether the measurement is finished.
     pub complete: bool,
 }
 
-/// One model.
+/// Results of one model.
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// The file as typed.
+    /// File name as typed.
     pub name: String,
-    /// Of everything that was read.
+    /// Hash of everything that was read.
     pub hash: u128,
-    /// Shapes of all kinds: N.
+    /// Number of shapes of all kinds: N.
     pub prims: usize,
-    /// Objects that they belong to, as `spheres` and `boxes` have them.
+    /// Number of objects that the shapes belong to, as bounded by `spheres` and `boxes`.
     pub objects: usize,
-    /// Instances that are kept, so that their triangles are stored once.
+    /// Number of kept instances, whose triangles are stored once.
     pub kept: usize,
-    /// What `auto` would choose and why, where that was asked.
+    /// Choice of `auto` with its reason, if evaluated.
     pub auto: Option<Reason>,
-    /// Columns of the picture whose rays were recorded.
+    /// Width in pixels of the picture whose rays were recorded.
     pub width: u32,
-    /// Its rows.
+    /// Height of the picture in pixels.
     pub height: u32,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// Bounces after the eye ray.
+    /// Maximum number of bounces after the primary ray.
     pub depth: u32,
-    /// Seen from where, in words, …
+    /// Camera in words.
     pub view: String,
-    /// … and exactly.
+    /// Exact camera.
     pub camera: View,
-    /// The rays.
+    /// Numbers of rays, by class.
     pub rays: Vec<Rays>,
-    /// One for each structure.
+    /// One row per structure.
     pub rows: Vec<Row>,
-    /// Slow structures that could not bear so many prims, or those that cannot keep instances.
+    /// Structures not measured: too slow for so many prims, or unable to keep instances.
     pub left_out: Vec<AccelKind>,
-    /// What is saved by leaving out what the scene does not need; `None`: not measured.
+    /// Saving of pruning; `None` if not measured.
     pub pruning: Option<Pruning>,
 }
 
-/// How many rays there were of a class.
+/// Numbers of rays of one class.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rays {
-    /// The class.
+    /// Class of the rays.
     pub class: Class,
-    /// Asked by the picture.
+    /// Rays asked by the picture.
     pub asked: u64,
-    /// Kept and measured.
+    /// Rays kept and measured.
     pub kept: usize,
 }
 
 impl Rays {
-    /// Of a set.
+    /// Numbers of a ray set.
     pub fn of(set: &RaySet) -> Self {
         Self { class: set.class, asked: set.asked, kept: set.len() }
     }
 }
 
 impl Model {
-    /// Seconds for a ray of the picture's mixture, of whose classes a part may be kept.
+    /// Seconds per ray, with the classes weighted as in the picture, even if only samples were kept.
     pub fn seconds_per_ray(&self, row: &Row) -> f64 {
         row.seconds_per_ray(&self.mixture(), Spread::median)
     }
 
-    /// The same if every class had its fastest pass at once, and its slowest.
+    /// The same if every class had its fastest pass at once, and if every class had its slowest.
     pub fn seconds_range(&self, row: &Row) -> [f64; 2] {
         let mixture = self.mixture();
         [Spread::min, Spread::max].map(|pick| row.seconds_per_ray(&mixture, pick))
@@ -115,20 +115,19 @@ impl Model {
         self.rays.iter().map(|r| r.asked).collect()
     }
 
-    /// A count for a ray of the picture's mixture.
+    /// Mean of a count per ray, with the classes weighted as in the picture.
     pub fn per_ray(&self, row: &Row, count: Count) -> f64 {
         self.mean(row, |class| class.per_ray(count))
     }
 
-    /// What is known of each class, for a ray of the picture's mixture.
+    /// Mean of a value of each class, with the classes weighted as in the picture.
     fn mean(&self, row: &Row, of: impl Fn(&ClassRow) -> f64) -> f64 {
         let all: u64 = self.rays.iter().map(|r| r.asked).sum();
         let sum: f64 = row.classes.iter().zip(&self.rays).map(|(class, r)| of(class) * r.asked as f64).sum();
         sum / all as f64
     }
 
-    /// Rays after which building has paid against testing everything; `None` when it never does, or `none` was not
-    /// measured.
+    /// Rays after which building has paid off against testing every prim; `None` when it never does, or `none` was not measured.
     pub fn break_even(&self, row: &Row) -> Option<f64> {
         let none = self.rows.iter().find(|r| r.kind == AccelKind::None && r.kind != row.kind)?;
         break_even(row.build.median(), self.seconds_per_ray(row), self.seconds_per_ray(none))
@@ -139,20 +138,20 @@ impl Model {
         self.rows.iter().map(Row::differing).sum()
     }
 
-    /// The structure whose answers the others must have.
+    /// Structure whose answers are the reference for the others.
     pub fn reference(&self) -> Option<AccelKind> {
         let fast = self.rows.iter().find(|r| !r.kind.is_slow());
         fast.or(self.rows.first()).map(|r| r.kind)
     }
 
-    /// Rays that more than one structure got, which are the ones whose hits were compared.
+    /// Number of rays that more than one structure got, and whose hits were therefore compared.
     pub fn compared(&self) -> u64 {
         let mut rays: Vec<u64> = self.rows.iter().map(Row::rays).collect();
         rays.sort_unstable();
         rays.iter().rev().nth(1).copied().unwrap_or(0)
     }
 
-    /// Whether all structures agree, in a sentence.
+    /// Sentence on whether all structures agree.
     pub fn verdict(&self) -> String {
         let (count, differing, compared) = (self.rows.len(), self.differing(), self.compared());
         let reference = self.reference().map_or("", AccelKind::name);
@@ -174,7 +173,7 @@ impl Model {
         }
     }
 
-    /// Its prims and objects.
+    /// Numbers of prims and objects, in words.
     pub fn size(&self) -> String {
         let prims = grouped(self.prims as u64);
         if self.kept > 0 {
@@ -190,7 +189,7 @@ impl Model {
         }
     }
 
-    /// What picture the rays are from.
+    /// Picture whose rays were recorded, in words.
     pub fn picture(&self) -> String {
         let Self { width, height, samples, depth, view, .. } = self;
         let samples = so_many(u64::from(*samples), "sample");
@@ -199,12 +198,12 @@ impl Model {
 }
 
 impl Report {
-    /// Whether times were taken.
+    /// Whether times were measured.
     pub fn is_timed(&self) -> bool {
         self.plan.passes > 0
     }
 
-    /// What to add where the times of two structures are told apart: nothing, where all passes of one beat all of the other.
+    /// Note to add where the times of two structures are compared: empty if all passes of one beat all of the other.
     fn doubt(&self, model: &Model, a: &Row, b: &Row) -> &'static str {
         let [[low, high], [other_low, other_high]] = [a, b].map(|row| model.seconds_range(row));
         match self.plan.passes {
@@ -215,7 +214,7 @@ impl Report {
         }
     }
 
-    /// How times were taken, in a sentence.
+    /// Sentence on how times were measured.
     pub fn method(&self) -> String {
         let Plan { passes, threads, seed, slow_tests, .. } = &self.plan;
         let on = if *threads == 1 { "one thread".to_owned() } else { format!("{threads} threads") };
@@ -232,21 +231,21 @@ impl Report {
     }
 }
 
-/// Types of report files.
+/// Formats of report files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Schema `meshray-bench/1`.
     Json,
-    /// One line for each structure and class.
+    /// One line per structure and class.
     Csv,
-    /// Tables for a document.
+    /// Tables for a Markdown document.
     Markdown,
-    /// A page with plots.
+    /// Page with plots.
     Html,
 }
 
 impl Format {
-    /// By the ending of a file's name.
+    /// Format by the file name's extension.
     pub fn from_path(path: &Path) -> Result<Self, String> {
         let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         match ending.as_str() {
@@ -258,7 +257,7 @@ impl Format {
         }
     }
 
-    /// The report in this format.
+    /// Writes the report in this format.
     pub fn write(self, report: &Report) -> String {
         match self {
             Self::Json => json::write(report),
@@ -269,7 +268,7 @@ impl Format {
     }
 }
 
-/// What the names of counts mean, a line each.
+/// Glossary of the names of counts.
 pub const WORDS: [(&str, &str); 16] = [
     ("*", "tests so much that it got an even sample of the rays"),
     ("n_in", "inner nodes"),

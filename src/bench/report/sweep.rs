@@ -1,4 +1,4 @@
-//! What a parameter costs over its values, and which value is best.
+//! Cost of each structure over the values of a swept parameter, and the best value.
 
 use super::cost::{Cost, costs};
 use super::table::Table;
@@ -7,45 +7,45 @@ use crate::accel::AccelKind;
 use crate::bench::row::Row;
 use crate::number::{seconds, short};
 
-/// One structure at all values of the parameter.
+/// One structure at all values of the swept parameter.
 #[derive(Clone, Debug)]
 pub struct Curve<'a> {
-    /// Which one.
+    /// Structure.
     pub kind: AccelKind,
-    /// By ascending value; one without a value comes last.
+    /// Rows by ascending value; the row without a value comes last.
     pub rows: Vec<&'a Row>,
-    /// The row that costs least.
+    /// Row of least cost.
     pub best: &'a Row,
-    /// The row of the default value; missing while the command is under way.
+    /// Row of the default value; `None` while the command is under way.
     pub default: Option<&'a Row>,
 }
 
-/// A structure for each curve, in the order of the plan.
+/// One curve per structure, in the order of the plan.
 pub fn curves<'a>(report: &Report, model: &'a Model) -> Vec<Curve<'a>> {
     let curve = |&kind: &AccelKind| {
         let rows: Vec<&Row> = model.rows.iter().filter(|r| r.kind == kind && r.setting.is_some()).collect();
         let is_default = |row: &Row| row.setting.is_some_and(|s| s.is_default);
         let default = rows.iter().copied().find(|row| is_default(row));
-        // Of equals the default.
+        // Among equals, prefer the default.
         let rank = |row: &&Row| (worth(report, model, row), !is_default(row));
         let best = rows.iter().copied().min_by(|a, b| {
             let ((a, other), (b, others)) = (rank(a), rank(b));
             a.total_cmp(&b).then(other.cmp(&others))
         })?;
-        // Where values make the same structure no time tells them apart.
+        // Values that give the same structure do not differ in cost, whatever the times are.
         let best = default.into_iter().chain(rows.iter().copied()).find(|row| are_same(row, best)).unwrap_or(best);
         Some(Curve { kind, rows, best, default })
     };
     report.plan.kinds.iter().filter_map(curve).collect()
 }
 
-/// Whether two rows are of one structure: equal in size and in all counts.
+/// Whether two rows are of the same structure: equal in size and in all counts.
 fn are_same(a: &Row, b: &Row) -> bool {
     let counts = |row: &Row| row.classes.iter().map(|class| class.counts).collect::<Vec<_>>();
     a.made_of == b.made_of && counts(a) == counts(b)
 }
 
-/// What is to be low: time where there is one, else tests and visits together.
+/// Cost to minimise: time if measured, else tests plus visits.
 fn worth(report: &Report, model: &Model, row: &Row) -> f64 {
     match report.is_timed() {
         true => model.seconds_per_ray(row),
@@ -54,7 +54,7 @@ fn worth(report: &Report, model: &Model, row: &Row) -> f64 {
 }
 
 impl Curve<'_> {
-    /// Value and cost of each row that has both.
+    /// Value and cost of each row that has a value.
     pub fn points(&self, model: &Model, cost: Cost) -> Vec<(f64, f64)> {
         let point = |row: &&Row| Some((row.setting?.value?, cost.of(model, row, None)));
         self.rows.iter().filter_map(point).collect()
@@ -66,7 +66,7 @@ impl Curve<'_> {
         (default > 0.0).then(|| 1.0 - worth(report, model, self.best) / default)
     }
 
-    /// The best value and how much better than the default it is.
+    /// Sentence with the best value and its advantage over the default.
     pub fn sentence(&self, report: &Report, model: &Model) -> String {
         let (Some(best), cost) = (self.best.setting, worth(report, model, self.best)) else { return String::new() };
         let (kind, told) = (
@@ -94,7 +94,7 @@ impl Curve<'_> {
         text
     }
 
-    /// Which end of the values the best is at, where the next one is worse; the default is no end.
+    /// End of the value range at which the best lies, if its neighbour is worse; `None` inside the range or at the default.
     fn end(&self, report: &Report, model: &Model) -> Option<&'static str> {
         let best = self.best.setting.filter(|s| !s.is_default)?.value?;
         let rows: Vec<&Row> =
@@ -109,7 +109,7 @@ impl Curve<'_> {
     }
 }
 
-/// A table for each structure: values down, costs across.
+/// One table per structure: values as rows, costs as columns.
 pub fn tables(report: &Report, model: &Model) -> Vec<Table> {
     let Some(sweep) = &report.plan.sweep else { return Vec::new() };
     let columns = || std::iter::once(sweep.parameter.to_string()).chain(costs(report).map(|c| c.name().to_owned()));
@@ -129,7 +129,7 @@ pub fn tables(report: &Report, model: &Model) -> Vec<Table> {
     curves(report, model).into_iter().map(table).collect()
 }
 
-/// A sentence for each structure.
+/// One sentence per structure.
 pub fn sentences(report: &Report, model: &Model) -> Vec<String> {
     curves(report, model).iter().map(|curve| curve.sentence(report, model)).collect()
 }

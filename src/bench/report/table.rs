@@ -1,18 +1,18 @@
-//! A table that every format can show.
+//! Table that every format can show.
 
-/// Cells of text under a title; the first column names the row.
+/// Text cells under a title; the first column names the row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Table {
-    /// What it shows.
+    /// Title.
     pub title: String,
-    /// Heads of the columns.
+    /// Column heads.
     pub columns: Vec<String>,
-    /// As many cells each.
+    /// Rows, with one cell per column.
     pub rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// For a terminal: each column as wide as it must be, and so wide at least that those of most tables stand below each other;
+    /// Plain text for a terminal: columns as wide as their cells, with a minimum width that aligns most tables with each other;
     /// all but the first flush right.
     pub fn text(&self) -> String {
         let lines = || std::iter::once(&self.columns).chain(&self.rows);
@@ -31,7 +31,7 @@ impl Table {
         out
     }
 
-    /// For a document.
+    /// Markdown table.
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         let rule = "--:|".repeat(self.columns.len().saturating_sub(1));

@@ -1,4 +1,4 @@
-//! The tables of a model, for every format: what each structure is made of, and what each class of rays costs in it.
+//! Tables of a model, for every format: composition of each structure, and its cost per ray class.
 
 use super::table::Table;
 use super::{Model, Rays, Report};
@@ -6,7 +6,7 @@ use crate::accel::Count;
 use crate::bench::row::{ClassRow, Row};
 use crate::number::{bytes, grouped, seconds, short, whole};
 
-/// What each structure takes, is made of, and pays.
+/// Memory, composition and build cost of each structure.
 pub(super) fn structures(report: &Report, model: &Model) -> Table {
     let mut columns = vec!["structure", "memory", "n_in", "n_v", "n_ev", "n_oiv"];
     if report.is_timed() {
@@ -27,8 +27,8 @@ pub(super) fn structures(report: &Report, model: &Model) -> Table {
     Table { title: "Structures".into(), columns: owned(&columns), rows: model.rows.iter().map(cells).collect() }
 }
 
-/// What the rays of a class, the `i`th, cost in each structure. Below one that got a sample stands how many of them that were,
-/// and half of the 95 % interval of each count.
+/// Cost of the rays of the `i`th class in each structure. Below a structure that got a sample stand its number of rays and half
+/// the 95 % interval of each count.
 pub(super) fn class(report: &Report, model: &Model, i: usize, rays: &Rays) -> Table {
     let sample = match rays.asked == rays.kept as u64 {
         true => String::new(),
@@ -66,7 +66,7 @@ fn costs(report: &Report, model: &Model, row: &Row, class: &ClassRow) -> Vec<Str
     cells
 }
 
-/// The line below that of a structure that got a sample.
+/// Line with the confidence of a sample, below that of its structure.
 fn certainty(report: &Report, class: &ClassRow) -> Vec<String> {
     let mut cells = vec![format!("  {} rays", grouped(class.counts.queries))];
     if report.is_timed() {
@@ -77,12 +77,12 @@ fn certainty(report: &Report, class: &ClassRow) -> Vec<String> {
     cells
 }
 
-/// A star marks a structure that got a sample.
+/// Name of a row's structure; a star marks a sample.
 pub(super) fn name(row: &Row) -> String {
     format!("{}{}", row.kind, if row.sampled { "*" } else { "" })
 }
 
-/// In per cent, with as many digits as tell it from 100.
+/// Culled share in per cent, with enough digits to distinguish it from 100.
 fn culled(class: &ClassRow, prims: usize) -> String {
     match class.culled(prims) * 100.0 {
         p if p > 99.0 && p < 100.0 => format!("{:.4}%", p.min(99.9999)),

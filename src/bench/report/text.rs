@@ -1,9 +1,9 @@
-//! Tables for a terminal.
+//! Report as text for a terminal.
 
 use super::{Model, Report, WORDS, auto, growth, sweep, tables};
 use std::fmt::{Result, Write};
 
-/// One model: its structures, then each class of rays, then whether hits agree.
+/// Writes one model: structures, classes of rays, and whether the hits agree.
 pub fn write(report: &Report, model: &Model) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
@@ -33,19 +33,19 @@ fn head(model: &Model) -> String {
     wrapped(&format!("{}: {}; rays of {}", model.name, model.size(), model.picture()))
 }
 
-/// One model in two lines, where the tables are of all.
+/// Writes a summary of one model in two lines, where the tables cover all models.
 pub fn write_short(model: &Model) -> String {
     format!("{}  {}\n", head(model), model.verdict())
 }
 
-/// How cost grows over all models.
+/// Writes the growth of cost over all models.
 pub fn write_growth(report: &Report) -> String {
     let tables: String = growth::tables(report).iter().map(|table| format!("\n{}", table.text())).collect();
     let said: String = growth::sentences(report).iter().map(|text| wrapped(&format!("{text}."))).collect();
     format!("{tables}\n{said}\n{}", wrapped(&format!("{}.", growth::METHOD)))
 }
 
-/// Lines of at most 120 columns, but for longer words; all but the first are indented.
+/// Wraps text at 120 columns, except for longer words; all lines but the first are indented.
 fn wrapped(text: &str) -> String {
     let (mut out, mut column) = (String::new(), 0);
     for word in text.split(' ') {
@@ -64,7 +64,7 @@ fn wrapped(text: &str) -> String {
     out + "\n"
 }
 
-/// What holds for all models.
+/// Writes the notes common to all models.
 pub fn write_notes(report: &Report) -> String {
     let words: String = WORDS.iter().map(|(word, what)| format!("{word:<11} {what}\n")).collect();
     format!("{words}{}\n{}\n", report.method(), report.machine.line())

@@ -1,4 +1,4 @@
-//! Our counts on one of the scenes, by the rules that the published ones go by.
+//! Counts of our structures on the SPD scenes, by the rules of the published counts.
 
 use super::published::{self, Figures};
 #[cfg(doc)]
@@ -11,44 +11,44 @@ use crate::render::{Question, World};
 use crate::scene;
 use rayon::prelude::*;
 
-/// How to measure.
+/// Settings of the measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
-    /// Ray/object tests that one structure may take, about: it gets an even sample of the rays where all would take more.
+    /// Approximate limit of ray/object tests per structure: an even sample of the rays is used where all would take more.
     pub tests: u64,
-    /// Changes what is sampled.
+    /// Seed of the sampling.
     pub seed: u64,
-    /// Pixels on an axis: [`PIXELS`], as the rules have it.
+    /// Pixels per axis; the rules prescribe [`PIXELS`].
     pub pixels: u32,
 }
 
-/// Everything about one scene.
+/// Results of one scene.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// What was published.
+    /// Published figures.
     pub published: &'static published::Scene,
-    /// Of the file.
+    /// Hash of the file.
     pub hash: u128,
-    /// Objects that were read.
+    /// Number of objects that were read.
     pub objects: usize,
-    /// Rays as Haines counts them.
+    /// Numbers of rays as Haines counts them.
     pub turned: Tally,
-    /// Rays as Havran and Sixta count them; those that the structures are given.
+    /// Numbers of rays as Havran and Sixta count them; these rays are sent to the structures.
     pub outward: Tally,
-    /// Each structure, as far as they are.
+    /// Results per structure, as far as measured.
     pub rows: Vec<Row>,
 }
 
 impl Measured {
-    /// Eye rays that hit, more than published.
+    /// Difference between measured and published number of primary hits.
     pub fn eye_hits_off(&self) -> i64 {
         self.outward.primary_hits.cast_signed() - self.published.rays.primary_hits.cast_signed()
     }
 
-    /// Our cost with the divisors of the published columns.
+    /// Our figures with the divisors of the published columns.
     ///
-    /// Per ray; but tests of octrees per hit, all hits of all rays together. The source does not say so. But the quotient of
-    /// the published column and the tests a ray is that of rays and hits in each of the eight scenes, at every depth.
+    /// All are per ray, but tests of octrees per hit, over the hits of all rays. The source does not say so, but the quotient of
+    /// the published column and the tests per ray equals rays over hits in each of the eight scenes, at every depth.
     pub fn comparable(&self, row: &Row) -> Figures {
         let rays_per_hit = self.outward.rays() as f64 / self.outward.hits().max(1) as f64;
         let n_it = if row.setting.is_octree() { row.ours.n_it * rays_per_hit } else { row.ours.n_it };
@@ -56,49 +56,49 @@ impl Measured {
     }
 }
 
-/// One structure beside its published figures.
+/// Figures of one structure beside the published ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Which one.
+    /// Structure.
     pub setting: Setting,
-    /// How far the boxes of faces reached beyond them.
+    /// Margin by which the boxes of faces are thickened.
     pub thickness: f64,
-    /// What was published.
+    /// Published figures.
     pub theirs: Figures,
-    /// What was counted, all a ray.
+    /// Counted figures, all per ray.
     pub ours: Figures,
-    /// Rays it was given.
+    /// Number of rays sent.
     pub rays: u64,
-    /// Rays whose answer differed from that of the structure which recorded them.
+    /// Number of rays whose answer differed from that of the structure that recorded them.
     pub differing: u64,
 }
 
-/// A published structure.
+/// Published structure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Setting {
-    /// A uniform grid.
+    /// Uniform grid.
     Grid {
-        /// How the resolution was chosen.
+        /// Rule by which the resolution was chosen.
         rule: &'static str,
-        /// Cells on each axis.
+        /// Cells per axis.
         cells: [u32; 3],
     },
-    /// An octree over one cell.
+    /// Octree over one cell.
     Octree {
-        /// Greatest depth.
+        /// Maximum depth.
         depth: u32,
     },
 }
 
 impl Setting {
-    /// All of a scene, with what was published.
+    /// All published structures of a scene, with their figures.
     pub fn all(scene: &published::Scene) -> Vec<(Self, Figures)> {
         let grids = scene.grids.iter().map(|g| (Self::Grid { rule: g.setting, cells: g.cells }, g.cost));
         let octrees = scene.octrees.iter().map(|o| (Self::Octree { depth: o.depth }, o.cost));
         grids.chain(octrees).collect()
     }
 
-    /// Which kind of structure.
+    /// Kind of the structure.
     pub fn kind(self) -> AccelKind {
         match self {
             Self::Grid { .. } => AccelKind::Grid,
@@ -106,8 +106,8 @@ impl Setting {
         }
     }
 
-    /// Parameters that follow the published rules: objects assigned by their boxes, tested again in each cell, and cells
-    /// split while they list more than one.
+    /// Parameters by the published rules: objects assigned by their boxes and tested again in each cell (no mailbox), and octree
+    /// cells split while they list more than one object.
     pub fn params(self, thickness: f64) -> AccelParams {
         let rules = AccelParams { assign: Assign::Box, thickness, mailbox: MailboxKind::None, ..AccelParams::DEFAULT };
         match self {
@@ -118,12 +118,12 @@ impl Setting {
         }
     }
 
-    /// Whether it is an octree.
+    /// Whether the structure is an octree.
     pub fn is_octree(self) -> bool {
         self.kind() == AccelKind::Octree
     }
 
-    /// As printed.
+    /// Name in reports.
     pub fn name(self) -> String {
         match self {
             Self::Grid { rule, cells: [x, y, z] } => format!("grid {x}×{y}×{z} ({rule})"),
@@ -131,7 +131,7 @@ impl Setting {
         }
     }
 
-    /// In one word.
+    /// Name in one word.
     pub fn short_name(self) -> String {
         match self {
             Self::Grid { cells: [x, y, z], .. } => format!("grid-{x}x{y}x{z}"),
@@ -140,8 +140,8 @@ impl Setting {
     }
 }
 
-/// Measures. `go_on` hears of every step, with what is known by then; `None` when it says to stop, or when the scene has
-/// no camera.
+/// Measures one scene. `go_on` is called at every step with the results so far; returns `None` when it stops the measurement, or
+/// when the scene has no camera.
 pub fn measure(
     published: &'static published::Scene,
     scene: &scene::Scene,
@@ -150,7 +150,7 @@ pub fn measure(
     go_on: &mut dyn FnMut(&Measured, &str) -> bool,
 ) -> Option<Measured> {
     let world = World::new(scene);
-    // What lets light through counts as being in its way.
+    // Transparent objects block shadow rays, too.
     let opaque = BitSet::filled(world.shapes.len(), true);
     let shapes = Shapes { opaque, ..world.shapes.clone() };
     let mut measured = Measured {
@@ -178,7 +178,7 @@ pub fn measure(
     Some(measured)
 }
 
-/// Faces as they are, and as thick as explains the published cells.
+/// Thickness of faces: none, then the one that explains the published cells.
 fn thicknesses(published: &published::Scene) -> impl Iterator<Item = f64> + use<> {
     let thick = published.thickness;
     std::iter::once(0.0).chain((thick > 0.0).then_some(thick))
@@ -205,7 +205,7 @@ impl Row {
         let made_of = accel.summary();
         let per_ray = |n: u64| n as f64 / counts.queries.max(1) as f64;
         self.ours = Figures {
-            // The one node above a grid's cells is none of theirs.
+            // The published counts lack the one node above a grid's cells.
             n_in: made_of.n_in - 1,
             n_v: made_of.n_v,
             n_ev: made_of.n_ev,
@@ -218,23 +218,23 @@ impl Row {
         (self.rays, self.differing) = (counts.queries, differing);
     }
 
-    /// As printed.
+    /// Name in reports.
     pub fn name(&self) -> String {
         let thick = if self.thickness > 0.0 { ", thick faces" } else { "" };
         format!("{}{thick}", self.setting.name())
     }
 
-    /// In one word.
+    /// Name in one word.
     pub fn short_name(&self) -> String {
         let thick = if self.thickness > 0.0 { "-thick" } else { "" };
         format!("{}{thick}", self.setting.short_name())
     }
 }
 
-/// Rays that one thread asks in a row.
+/// Rays per parallel task.
 const SLICE: usize = 8192;
 
-/// Counts over all rays, and how many answers differ from the recorder's.
+/// Sums the counts of all rays, and counts the answers that differ from the recorder's.
 fn replay(accel: &AnyAccel, recorder: &AnyAccel, rays: &RaySet) -> (RayCounts, u64) {
     let slices = rays.batches.iter().flat_map(|b| b.rays.chunks(SLICE).map(|rays| (b.question, rays)));
     let slices: Vec<(Question, &[_])> = slices.collect();

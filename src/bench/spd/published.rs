@@ -1,46 +1,46 @@
-//! What was published about the scenes, as facts: counts of objects and rays, and what a grid and an octree cost.
+//! Published figures of the SPD scenes: numbers of objects and rays, and costs of a grid and an octree.
 
-/// A scene and what is known of it.
+/// Published figures of one scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene {
     /// Name of the file, without `.nff`.
     pub name: &'static str,
-    /// Polygons, patches, spheres, cones and cylinders.
+    /// Number of polygons, patches, spheres, cones and cylinders.
     pub objects: u32,
-    /// Rays as Havran and Sixta counted them.
+    /// Numbers of rays by Havran and Sixta.
     pub rays: Rays,
-    /// Haines' own, "within about 10 %" of any program's; none of `lattice`.
+    /// Haines' numbers of rays, "within about 10 %" of any program's; none for `lattice`.
     pub haines: Option<HainesRays>,
-    /// A uniform grid by three rules of resolution.
+    /// Uniform grids by three rules of resolution.
     pub grids: [Grid; 3],
-    /// An octree of depths 4 to 7.
+    /// Octrees of depths 4 to 7.
     pub octrees: [Octree; 4],
-    /// How far the boxes of faces must reach beyond them along their normals to give the published numbers of cells; 0: not
-    /// at all. Nothing is published about that: it was found by trying.
+    /// Margin of the boxes of faces along their normals that reproduces the published numbers of cells; 0 without any. It is not
+    /// published but was found by trial.
     pub thickness: f64,
 }
 
-/// Rays sent, and those that hit something.
+/// Numbers of rays sent, and of those that hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rays {
-    /// Eye rays.
+    /// Primary rays.
     pub primary: u64,
-    /// Those that hit.
+    /// Primary rays that hit.
     pub primary_hits: u64,
     /// Shadow rays.
     pub shadow: u64,
-    /// Those that meet something before the light.
+    /// Shadow rays that hit something before the light.
     pub shadow_hits: u64,
     /// Reflected and refracted rays.
     pub secondary: u64,
-    /// Those that hit.
+    /// Reflected and refracted rays that hit.
     pub secondary_hits: u64,
 }
 
-/// Rays of Haines' table.
+/// Numbers of rays in Haines' table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HainesRays {
-    /// Eye rays that hit.
+    /// Primary rays that hit.
     pub primary_hits: u64,
     /// Reflected rays.
     pub reflected: u64,
@@ -50,54 +50,54 @@ pub struct HainesRays {
     pub shadow: u64,
 }
 
-/// What a structure is made of and what it costs a ray.
+/// Composition of a structure, and its costs per ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
     /// Interior nodes; 0 in a grid.
     pub n_in: u64,
     /// Cells.
     pub n_v: u64,
-    /// Empty ones.
+    /// Empty cells.
     pub n_ev: u64,
     /// Objects listed in all cells.
     pub n_oiv: u64,
-    /// Ray/object tests a ray.
+    /// Ray/object tests per ray.
     pub n_it: f64,
-    /// Steps a ray. Programs do not agree on what a step of an octree is.
+    /// Steps per ray. Programs disagree on what a step in an octree is.
     pub n_ts: f64,
-    /// Cells visited a ray.
+    /// Cells visited per ray.
     pub n_ets: f64,
-    /// Empty ones.
+    /// Empty cells visited per ray.
     pub n_eets: f64,
 }
 
-/// A uniform grid.
+/// Published uniform grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
-    /// How the resolution was chosen.
+    /// Rule by which the resolution was chosen.
     pub setting: &'static str,
-    /// Cells on each axis.
+    /// Cells per axis.
     pub cells: [u32; 3],
-    /// Its cost.
+    /// Published costs.
     pub cost: Figures,
 }
 
-/// Havran's *Octree84-C*: A. Glassner's of 1984, cut in the middle, at most one object in a leaf that is not of the greatest
-/// depth, objects assigned to cells by their boxes.
+/// Havran's *Octree84-C*: A. Glassner's octree of 1984, with cells split in the middle, at most one object per leaf above the
+/// maximum depth, and objects assigned to cells by their boxes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Octree {
-    /// Greatest depth; the root has 0.
+    /// Maximum depth; the root has depth 0.
     pub depth: u32,
-    /// Its cost.
+    /// Published costs.
     pub cost: Figures,
 }
 
-/// Numbers in the order of a printed row.
+/// Figures in the order of a printed row.
 const fn cost([n_in, n_v, n_ev, n_oiv]: [u64; 4], [n_it, n_ts, n_ets, n_eets]: [f64; 4]) -> Figures {
     Figures { n_in, n_v, n_ev, n_oiv, n_it, n_ts, n_ets, n_eets }
 }
 
-/// All eight.
+/// All eight scenes.
 pub const SCENES: [Scene; 8] = [
     Scene {
         name: "balls",

@@ -1,4 +1,4 @@
-//! Our counts beside the published ones, in every format of a report.
+//! Comparison of our counts with the published ones, in every report format.
 
 use super::measure::{Measured, Row};
 use super::published::{Figures, HainesRays};
@@ -8,29 +8,29 @@ use crate::bench::report::{Format, html};
 use crate::number::{grouped, hash, short};
 use serde_json::{Value, json};
 
-/// Identifies the JSON of these reports.
+/// Schema of the JSON report.
 pub const SCHEMA: &str = "meshray-spd/1";
 
-/// How near a count must be to be called the same program's on another machine: 15 %.
+/// Relative difference up to which a count passes as equal: 15 %.
 pub const NEAR: f64 = 0.15;
 
-/// How near Haines' counts of rays should be: 0.5 %.
+/// Relative difference up to which Haines' numbers of rays pass as equal: 0.5 %.
 const NEAR_RAYS: f64 = 0.005;
 
-/// All scenes that were measured.
+/// Results of all measured scenes.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// Where.
+    /// Machine and build of the measurement.
     pub machine: Machine,
-    /// Ray/object tests of one structure, about.
+    /// Approximate limit of ray/object tests per structure.
     pub tests: u64,
-    /// Of the samples.
+    /// Seed of the sampling.
     pub seed: u64,
-    /// In the order they were asked for.
+    /// Scenes in the requested order.
     pub scenes: Vec<Measured>,
 }
 
-/// What to know when reading a report.
+/// Notes on how to read a report.
 pub const NOTES: [&str; 5] = [
     "Published: E. Haines' counts of rays (in the notes to his databases); V. Havran and F. Sixta, Comparison of \
      Hierarchical Grids, and V. Havran, Comparison of Octree Traversal Algorithms (variant Octree84-C), 1999",
@@ -46,7 +46,7 @@ pub const NOTES: [&str; 5] = [
 ];
 
 impl Report {
-    /// What came out, a sentence each.
+    /// Results, one sentence each.
     pub fn verdicts(&self) -> Vec<String> {
         if self.scenes.is_empty() {
             return Vec::new();
@@ -125,13 +125,13 @@ impl Report {
         self.scenes.iter().flat_map(|s| s.rows.iter().map(move |r| (s, r)))
     }
 
-    /// Whether hits agree, eye rays hit as often as published, up to 2, and there are as many objects.
+    /// Whether all structures agree, the number of primary hits is within 2 of the published one, and that of objects is equal.
     pub fn is_right(&self) -> bool {
         let agree = self.scenes.iter().flat_map(|s| &s.rows).all(|r| r.differing == 0);
         agree && self.scenes.iter().all(|s| s.eye_hits_off().abs() <= 2 && s.objects == s.published.objects as usize)
     }
 
-    /// The report in a format.
+    /// Writes the report in a format.
     pub fn write(&self, format: Format) -> String {
         match format {
             Format::Json => format!("{:#}\n", self.json()),
@@ -154,7 +154,7 @@ impl Report {
         self.scenes.iter().flat_map(tables).collect()
     }
 
-    /// How to read it, and where it was made.
+    /// Notes on how to read the report and where it was made.
     pub fn notes(&self) -> String {
         bullets(&self.note_lines())
     }
@@ -198,7 +198,7 @@ impl Report {
     }
 }
 
-/// The rays of a scene, then its structures.
+/// Tables of a scene: rays, then structures.
 pub fn tables(scene: &Measured) -> [Table; 2] {
     [ray_table(scene), structure_table(scene)]
 }
@@ -231,7 +231,7 @@ fn ray_table(scene: &Measured) -> Table {
     Table { title, columns: ["rays", "ours", "published", "off", "by"].map(String::from).to_vec(), rows }
 }
 
-/// What Haines counted, ours, his.
+/// Haines' counts: name, ours, his.
 fn haines_pairs(scene: &Measured) -> Vec<(&'static str, u64, Option<u64>)> {
     let t = scene.turned;
     let of = |get: fn(HainesRays) -> u64| scene.published.haines.map(get);
@@ -266,13 +266,13 @@ fn structure_table(scene: &Measured) -> Table {
     Table { title, columns: columns.map(String::from).to_vec(), rows: rows.collect() }
 }
 
-/// In the order n_in, n_v, n_ev, n_oiv, n_it, n_ets, n_eets, n_ts.
+/// Figures in the order n_in, n_v, n_ev, n_oiv, n_it, n_ets, n_eets, n_ts.
 fn values(c: Figures) -> [f64; 8] {
     let [n_in, n_v, n_ev, n_oiv] = [c.n_in, c.n_v, c.n_ev, c.n_oiv].map(|n| n as f64);
     [n_in, n_v, n_ev, n_oiv, c.n_it, c.n_ets, c.n_eets, c.n_ts]
 }
 
-/// Relative difference; `None` where there is nothing to compare with.
+/// Relative difference; `None` if the published value is 0 and ours is not.
 fn off(ours: f64, theirs: f64) -> Option<f64> {
     match theirs {
         0.0 => (ours == 0.0).then_some(0.0),
@@ -280,7 +280,7 @@ fn off(ours: f64, theirs: f64) -> Option<f64> {
     }
 }
 
-/// Whether tests and cells a ray are as published, within [`NEAR`].
+/// Whether tests and visited cells per ray are within [`NEAR`] of the published ones.
 fn is_near(scene: &Measured, row: &Row) -> bool {
     let ours = scene.comparable(row);
     let near = |a, b| off(a, b).is_some_and(|off| off.abs() <= NEAR);

@@ -1,9 +1,9 @@
-//! Haines' rules: which rays a picture of one of his scenes needs, so that the counts of two programs are comparable.
+//! Haines' rules for the rays of a picture, which make the counts of two programs comparable.
 //!
-//! Eye rays pass through the corners of 512 × 512 pixels. What is hit sends a shadow ray to each light, unless its normal
-//! points away from it; what reflects or lets light through sends a reflected ray, what lets light through also a
-//! refracted one, unless it is reflected totally. No ray is left out for its small weight; the eye ray is the first of at
-//! most five generations. Surfaces are seen from both sides.
+//! Primary rays pass through the corners of 512 × 512 pixels. Every hit sends a shadow ray to each light that its normal does not
+//! point away from; reflecting or transmitting surfaces also send a reflected ray, and transmitting ones a refracted ray unless
+//! there is total internal reflection. No ray is dropped for its small weight; with the primary rays there are at most five
+//! generations. Surfaces are visible from both sides.
 
 use crate::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray, Shapes};
 use crate::math::{DVec3, Vec3};
@@ -13,30 +13,30 @@ use crate::scene::{Camera, LightKind, Projection, Reflection, Scene};
 use rayon::prelude::*;
 use std::ops::AddAssign;
 
-/// Pixels on an axis.
+/// Pixels per axis.
 pub const PIXELS: u32 = 512;
 
-/// Generations of rays, the eye's counted.
+/// Generations of rays, including the primary rays.
 const GENERATIONS: u32 = 5;
 
-/// Rays that are traced together.
+/// Rays per parallel task.
 const SLICE: usize = 4096;
 
-/// Which side of a surface counts as its outside when shadow rays are sent. The rules leave it open.
+/// Convention for the outside of a surface when shadow rays are sent. The rules leave it open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Facing {
-    /// That from which it is seen, as Haines' own counts have it.
+    /// The side that the ray hits, as in Haines' own counts.
     Turned,
-    /// That of the file's normals, as Havran's have it.
+    /// The side of the file's normals, as in Havran's counts.
     Outward,
 }
 
-/// How many rays there were, and how many hit something.
+/// Numbers of rays and hits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Eye rays.
+    /// Primary rays.
     pub primary: u64,
-    /// Those that hit.
+    /// Primary rays that hit.
     pub primary_hits: u64,
     /// Reflected rays.
     pub reflected: u64,
@@ -46,7 +46,7 @@ pub struct Tally {
     pub secondary_hits: u64,
     /// Shadow rays.
     pub shadow: u64,
-    /// Shadow rays that met something before the light, whether it lets light through or not.
+    /// Shadow rays that hit something before the light, whether transparent or not.
     pub shadow_hits: u64,
 }
 
@@ -56,7 +56,7 @@ impl Tally {
         self.reflected + self.refracted
     }
 
-    /// Rays that hit something; a picture cannot do with fewer tests.
+    /// Rays that hit something; any structure needs at least this many tests.
     pub fn hits(&self) -> u64 {
         self.primary_hits + self.secondary_hits + self.shadow_hits
     }
@@ -79,21 +79,21 @@ impl AddAssign for Tally {
     }
 }
 
-/// The rays of a picture.
+/// Rays of a picture.
 #[derive(Clone, Debug, Default)]
 pub struct Sent {
-    /// How many.
+    /// Numbers of rays.
     pub tally: Tally,
-    /// Eye rays, then those reflected and refracted, generation by generation: what do they hit first?
+    /// Primary rays, then reflected and refracted ones, generation by generation, for closest-hit queries.
     pub seeing: Vec<Ray>,
-    /// Shadow rays: does anything lie on them?
+    /// Shadow rays, for occlusion queries.
     pub shadow: Vec<Ray>,
 }
 
-/// Sends all rays of the picture that the scene's first camera sees. `None` if it has none, or one for parallel rays.
+/// Sends all rays of the picture of the scene's first camera. `None` without a camera, or if it is orthographic.
 ///
-/// `pixels` is their number on an axis; there is one more corner. Everything must stop light: `shapes` are those of
-/// `world`, but all opaque, and `accel` is built over them.
+/// `pixels` is the number per axis; there is one more corner. Everything must be opaque: `shapes` are those of `world` with all
+/// opaque flags set, and `accel` is built over them.
 pub fn send<A: Accel>(
     scene: &Scene,
     world: &World,
@@ -125,7 +125,7 @@ pub fn send<A: Accel>(
     Some(sent)
 }
 
-/// Through the corners of all pixels, row by row from above.
+/// Primary rays through the corners of all pixels, row by row from the top.
 fn eye_rays(camera: &Camera, center: DVec3, pixels: u32) -> Option<Vec<Ray>> {
     let Projection::Perspective { y_fov, .. } = camera.projection else { return None };
     let half = libm::tan(y_fov / 2.0);
@@ -138,12 +138,12 @@ fn eye_rays(camera: &Camera, center: DVec3, pixels: u32) -> Option<Vec<Ray>> {
     Some((0..=pixels).flat_map(|row| (0..=pixels).map(move |column| (row, column))).map(|(r, c)| ray(r, c)).collect())
 }
 
-/// No ray excludes the face it starts on: the programs that are compared with tested it as any other.
+/// Rays do not exclude the face they start on: the programs compared with tested it like any other.
 fn ray(origin: Vec3, dir: Vec3, t_max: f32) -> Ray {
     Ray { origin, t_min: 0.0, dir, t_max, exclude: NO_PRIM, sample: 0 }
 }
 
-/// Places of the lights in the frame of the shapes.
+/// Positions of the lights in the frame of the shapes.
 fn lights(scene: &Scene, world: &World) -> Vec<Vec3> {
     let place = |kind: &LightKind| match kind {
         LightKind::Point { position, .. } => Some((position - world.center).as_vec3()),
@@ -152,11 +152,11 @@ fn lights(scene: &Scene, world: &World) -> Vec<Vec3> {
     scene.lights.iter().filter_map(|light| place(&light.kind)).collect()
 }
 
-/// What a material sends.
+/// Secondary rays of a material.
 #[derive(Clone, Copy, Debug, Default)]
 struct Kind {
     reflects: bool,
-    /// Index of refraction of what lets light through.
+    /// Index of refraction of a transmitting material.
     transmits: Option<f64>,
 }
 
@@ -181,7 +181,7 @@ struct Tracer<'a, A> {
     kinds: Vec<Kind>,
 }
 
-/// What some rays led to.
+/// Results of one slice of rays.
 #[derive(Default)]
 struct Part {
     tally: Tally,
@@ -207,7 +207,7 @@ impl<A: Accel> Tracer<'_, A> {
         part
     }
 
-    /// The rays that a hit sends.
+    /// Adds the shadow and secondary rays of a hit.
     fn follow(&self, ray: &Ray, hit: &Hit, last: bool, part: &mut Part) {
         let at = self.shapes.refine(ray, hit);
         let own = given_normal(self.scene, self.world, hit.prim, &at).unwrap_or(at.normal);
@@ -217,7 +217,7 @@ impl<A: Accel> Tracer<'_, A> {
         let lit_side = if self.facing == Facing::Turned { turned } else { own };
         for light in self.lights.iter().filter(|&&light| lit_side.dot(light - at.position) > 0.0) {
             let origin = at.origin(light - at.position);
-            // The light is at 1.
+            // The light lies at t = 1.
             part.shadow.push(self::ray(origin, light - origin, 1.0));
         }
 

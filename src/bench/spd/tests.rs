@@ -1,4 +1,4 @@
-//! Counts that can be worked out by hand, and how they are shown.
+//! Counts that can be derived by hand, and their reports.
 
 use super::measure::{Measured, Plan, Setting, measure};
 use super::published::SCENES;
@@ -13,13 +13,13 @@ use crate::render::World;
 use crate::scene::Scene;
 use std::path::Path;
 
-/// On an axis.
+/// Pixels per axis.
 const PIXELS: u32 = 64;
 
-/// 65 × 65.
+/// Number of primary rays: 65 × 65.
 const EYE_RAYS: u64 = 4225;
 
-/// A camera on the z axis that sees exactly the square of side 4 in z = 0, and one light beside it.
+/// Camera on the z axis that sees exactly the square of side 4 in z = 0, and one light above it.
 const VIEW: &str = "b 0 0 0\nv\nfrom 0 0 10\nat 0 0 0\nup 0 1 0\nangle 22.619864948040426\nhither 1\nresolution 512 512\n\
                     l 0 0 20\n";
 
@@ -32,7 +32,7 @@ fn scene(text: &str) -> Scene {
     load_bytes(Path::new("scene.nff"), text.into_bytes(), &options).expect("it is NFF").scene
 }
 
-/// A square of half the side in the plane z, seen from above if `up`.
+/// Square in the plane z with the given half side, facing +z if `up`.
 fn square(half: f64, z: f64, up: bool) -> String {
     let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
     let line = |(x, y): &(f64, f64)| format!("{} {} {z}\n", x * half, y * half);
@@ -53,7 +53,7 @@ fn tally(text: &str, facing: Facing) -> Tally {
 
 #[test]
 fn eye_rays_pass_through_the_corners_of_the_pixels() {
-    // Half as wide as the view and a little more: 33 of 65 corners on each axis, where 32 pixels would be.
+    // Slightly wider than half the view: 33 of 65 corners on each axis, where 32 pixels would be.
     let counted = tally(&format!("{MATT}{}", square(1.01, 0.0, true)), Facing::Outward);
     let hits = 33 * 33;
     let expected = Tally { primary: EYE_RAYS, primary_hits: hits, shadow: hits, ..Tally::default() };
@@ -69,7 +69,7 @@ fn a_face_seen_from_behind_sends_shadow_rays_only_where_normals_are_turned() {
 
 #[test]
 fn two_mirrors_send_four_generations_after_the_eye_and_no_more() {
-    // The view is in between: the upper mirror sees the lower one again and again, as far as rays go straight.
+    // The camera is in between: rays go back and forth between the mirrors.
     let mirrors = format!("{MIRROR}{}{}", square(50.0, 0.0, true), square(50.0, 30.0, false));
     let counted = tally(&mirrors, Facing::Outward);
     assert_eq!((counted.primary_hits, counted.reflected, counted.refracted), (EYE_RAYS, 4 * EYE_RAYS, 0));
@@ -86,7 +86,7 @@ fn what_lets_light_through_reflects_and_refracts_and_is_in_the_way_of_light() {
 
 #[test]
 fn light_that_cannot_leave_glass_is_reflected_only() {
-    // The face looks away from the eye, which is so within the glass.
+    // The face looks away from the camera, which is thus inside the glass.
     let slab = format!("f 1 1 1 0 0 0 0.9 1.5\n{}", square(50.0, 0.0, false));
     let counted = tally(&slab, Facing::Outward);
     assert_eq!((counted.reflected, counted.refracted), (EYE_RAYS, EYE_RAYS), "steep enough");
@@ -111,7 +111,7 @@ fn published_sums_are_those_of_their_parts() {
 }
 
 fn measured() -> Measured {
-    // Not one of theirs; but everything is measured in the same way.
+    // The scene is none of the published ones, but it is measured in the same way.
     let balls = (0..40).map(|i| format!("s {} {} {} 0.2\n", i % 5 - 2, i / 5 % 4 - 2, i / 20));
     let text = format!("{MIRROR}{}{}", square(3.0, -1.0, true), balls.collect::<String>());
     let plan = Plan { tests: 40_000, seed: 0, pixels: PIXELS };
@@ -130,7 +130,7 @@ fn published_rules_give_the_same_hits_and_cells_that_add_up() {
             Setting::Octree { .. } => assert_eq!(row.ours.n_v, 7 * row.ours.n_in + 1),
         }
     }
-    // The tests of octrees are compared by hit, those of grids by ray.
+    // Tests of octrees are compared per hit, those of grids per ray.
     let octree = measured.rows.last().expect("seven");
     let rays_per_hit = measured.outward.rays() as f64 / measured.outward.hits() as f64;
     assert!((measured.comparable(octree).n_it / octree.ours.n_it - rays_per_hit).abs() < 1e-9);
@@ -139,7 +139,7 @@ fn published_rules_give_the_same_hits_and_cells_that_add_up() {
 
 #[test]
 fn octrees_over_the_tetrahedra_have_exactly_the_published_cells() {
-    // The same 4096 faces as in tetra.nff; only their order differs.
+    // The same 4096 faces as in tetra.nff, in another order.
     let scene = Family::Tetra.scene(4096);
     let mesh = &scene.meshes[0];
     let opaque = BitSet::filled(mesh.triangles.len(), true);
@@ -163,6 +163,6 @@ fn every_format_has_both_columns() {
     }
     let text: String = tables(&report.scenes[0]).iter().map(|t| t.text()).collect();
     assert!(text.contains("959 244") && text.contains("1999"), "{text}");
-    // Other objects than theirs, so other eye rays.
+    // The objects differ from the published ones, and so do the primary hits.
     assert!(!report.is_right());
 }

@@ -1,18 +1,18 @@
-//! Which settings to use for what, and why.
+//! Recommended settings by purpose, with reasons.
 
 use super::Study;
 use super::knob::Knob;
 use super::measure::Row;
 use crate::render::{Quality, Sampling};
 
-/// What is advised for one purpose.
+/// Recommendation for one purpose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Advice {
-    /// For what.
+    /// Purpose.
     pub purpose: Quality,
-    /// Place of the row that is advised; `None` where none is good enough.
+    /// Index of the recommended row; `None` if no setting is good enough.
     pub row: Option<usize>,
-    /// Why, in a sentence.
+    /// Reason, in a sentence.
     pub why: String,
 }
 
@@ -20,13 +20,13 @@ pub(super) fn advice(study: &Study) -> Vec<Advice> {
     Quality::ALL.iter().map(|&purpose| advise(study, purpose)).collect()
 }
 
-/// The program's own choice for a purpose, where nothing that is as good takes much less time.
+/// Recommends the program's own choice for a purpose unless a setting that is good enough saves much time.
 fn advise(study: &Study, purpose: Quality) -> Advice {
-    /// Part of the time that another setting must save to be worth its flags: differences below this are those of the next
-    /// view of the model, which a setting that was found for this one knows nothing of.
+    /// Part of the time that another setting must save to be worth its flags: smaller differences also occur between views of a
+    /// model, and the setting was found in only one.
     const WORTH: f64 = 0.4;
     let goal = purpose.good_enough();
-    // As the table has it.
+    // Time as in the table.
     let time = |i: usize| study.rows[i].cpu.median();
     let good: Vec<usize> = (0..study.rows.len()).filter(|&i| study.rows[i].error.known() <= goal).collect();
     let fastest = good.iter().copied().min_by(|&a, &b| time(a).total_cmp(&time(b)));
@@ -60,7 +60,7 @@ fn advise(study: &Study, purpose: Quality) -> Advice {
     Advice { purpose, row: Some(row), why }
 }
 
-/// What kind of error is left, measured against a reference that is so far off itself.
+/// Kind of the remaining error, given the error of the reference itself.
 fn rest(row: &Row, reference: f64) -> &'static str {
     match row.setting.settings.sampling {
         _ if row.error.bias <= row.error.noise => "most of it noise",

@@ -1,7 +1,7 @@
-//! The Pareto front: what nothing else beats in both time and error.
+//! The Pareto front: points that no other beats in both time and error.
 
-/// Places of the (time, error) pairs that are on the front, from the least time to the least error. Of equal pairs the first
-/// counts; what is no number is never on it.
+/// Indices of the (time, error) pairs on the front, from least time to least error. Of equal pairs the first is taken; pairs with
+/// a non-finite value are never on it.
 pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     let mut order: Vec<usize> =
         (0..points.len()).filter(|&i| points[i].0.is_finite() && points[i].1.is_finite()).collect();

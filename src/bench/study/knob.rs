@@ -1,4 +1,4 @@
-//! The knobs that a scene has, what each costs and risks ([`Knob::price`]), and the settings of each that are tried.
+//! The knobs of a scene, their cost and risk ([`Knob::price`]), and the settings of each to try.
 
 use super::Subject;
 use crate::accel::IntersectorKind;
@@ -7,7 +7,7 @@ use crate::scene::features::{Feature, Features};
 use crate::scene::{Material, MetalRough, Scene};
 use std::fmt;
 
-/// What is turned.
+/// Option that is varied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Knob {
     /// `--quality`.
@@ -33,7 +33,7 @@ pub enum Knob {
 }
 
 impl Knob {
-    /// Every one, in the order they are tried.
+    /// All knobs, in the order of measurement.
     pub const ALL: [Self; 10] = [
         Self::Quality,
         Self::Uniform,
@@ -47,7 +47,7 @@ impl Knob {
         Self::Test,
     ];
 
-    /// Its name in reports.
+    /// Name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Quality => "quality",
@@ -63,7 +63,7 @@ impl Knob {
         }
     }
 
-    /// What it costs to turn it up, and what is at risk when it is turned down.
+    /// Cost of turning the knob up, and risk of turning it down.
     pub const fn price(self) -> (&'static str, &'static str) {
         match self {
             Self::Quality | Self::Stochastic => {
@@ -87,7 +87,7 @@ impl Knob {
         }
     }
 
-    /// Whether the scene has it.
+    /// Whether the knob has an effect in the scene.
     fn is_in(self, features: &Features, scene: &Scene) -> bool {
         let is_frosted = |m: &MetalRough| m.transmits() && m.roughness > 0.0;
         let any = |of: &[Feature]| of.iter().any(|&f| features.has(f));
@@ -111,17 +111,17 @@ impl fmt::Display for Knob {
 /// One way to render the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
-    /// What it turns.
+    /// Knob that is varied.
     pub knob: Knob,
-    /// How it is typed: flags of `meshray render`.
+    /// Flags of `meshray render` for the setting.
     pub flags: String,
-    /// What that means.
+    /// Render settings that the flags mean.
     pub settings: Settings,
-    /// The ray/triangle test.
+    /// Ray/triangle test.
     pub test: IntersectorKind,
 }
 
-/// Every setting of every knob that the scene has. What a knob does not turn is as `render` has it.
+/// All settings of all knobs that apply to the scene. Everything else is as `render` has it by default.
 pub(super) fn settings(subject: &Subject) -> Vec<Setting> {
     let features = Features::of(subject.scene);
     Knob::ALL
@@ -136,7 +136,7 @@ fn of(knob: Knob, subject: &Subject) -> Vec<Setting> {
         let min_samples = how.min_samples.max(subject.fewest).min(how.max_samples);
         Sampling::Stochastic(Stochastic { min_samples, space: subject.space(), ..how })
     };
-    // What is rendered where a flag says nothing of samples.
+    // Settings of a rendering whose flags do not concern sampling.
     let usual = match subject.samples {
         Some(samples) => Settings { sampling: Sampling::Uniform, samples, ..subject.base.clone() },
         None => Settings { sampling: stochastic(Quality::default().stochastic()), ..subject.base.clone() },

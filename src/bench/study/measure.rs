@@ -1,4 +1,4 @@
-//! One setting: what it costs, how wrong it is, and how much of that is noise.
+//! Measures one setting: cost, error, and the part of the error that is noise.
 
 use super::reference::{Reference, codes};
 use super::{Plan, Setting, Subject};
@@ -9,27 +9,27 @@ use crate::image::srgb;
 use crate::render::{Settings, render};
 use crate::stopwatch::Stopwatch;
 
-/// Half of the side of a crop, in pixels.
+/// Half the side of a crop, in pixels.
 const CROP: usize = 12;
 
-/// What was measured of one setting.
+/// Measurements of one setting.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// Which.
+    /// The setting.
     pub setting: Setting,
-    /// Seconds of processor time of a rendering, all threads together.
+    /// CPU seconds of a rendering, all threads together.
     pub cpu: Spread,
-    /// Seconds by the clock on the wall.
+    /// Wall-clock seconds of a rendering.
     pub wall: Spread,
-    /// Eye rays of a pixel, on the average.
+    /// Mean number of primary rays per pixel.
     pub samples: f64,
-    /// How wrong it is.
+    /// Error of the renderings.
     pub error: Error,
-    /// What it is like where it is worst.
+    /// Crop around the pixel with the greatest error.
     pub crop: Crop,
 }
 
-/// How wrong pictures are: codes 0..=1 of the picture as displayed.
+/// Error of renderings, in display codes 0..=1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Error {
     /// Root of the mean squared error of a rendering, the reference's own taken off.
@@ -40,36 +40,36 @@ pub struct Error {
     pub noise: f64,
     /// How far the mean of all is off the reference: what no number of samples lessens.
     pub bias: f64,
-    /// The greatest error of a channel of the first rendering.
+    /// Greatest error of a channel of the first rendering.
     pub max: f64,
-    /// Mean FLIP of the first rendering, on black.
+    /// Mean FLIP of the first rendering, over black.
     pub flip: f64,
-    /// The column and row with the greatest error.
+    /// Column and row of the greatest error.
     pub worst: (u32, u32),
 }
 
 impl Error {
-    /// What [`Self::rmse`] is at most, as far as can be told.
+    /// Upper bound of [`Self::rmse`], given the detection limit.
     pub fn known(&self) -> f64 {
         self.rmse.max(self.least)
     }
 
-    /// [`Self::rmse`] with so many digits, as far as it can be told.
+    /// Formats [`Self::rmse`] with `digits` decimals, as `<` the detection limit where it is below.
     pub fn told(&self, digits: usize) -> String {
         let (sign, error) = (if self.rmse < self.least { "<" } else { "" }, self.known());
         let rounded = format!("{error:.digits$}");
-        // What is not nothing is not told as nothing.
+        // A non-zero value must not be rounded to zero.
         let is_lost = error > 0.0 && rounded.bytes().all(|digit| matches!(digit, b'0' | b'.'));
         if is_lost { format!("{sign}{error:.1e}") } else { format!("{sign}{rounded}") }
     }
 }
 
-/// A square of pixels around the worst one, as displayed on black.
+/// Square of pixels around the worst one, displayed over black.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crop {
-    /// How it should be.
+    /// Crop of the reference.
     pub expected: Picture,
-    /// How it is.
+    /// Crop of the first rendering.
     pub actual: Picture,
 }
 
@@ -82,7 +82,7 @@ pub(super) fn measure(subject: &Subject, plan: &Plan, reference: &Reference, set
         let watch = Stopwatch::of_all_threads();
         let rendered = render(&subject.job(&settings, &accel), &());
         let spent = watch.read();
-        // Where the system does not tell the time of processors, that on the wall has to do.
+        // Fall back to wall-clock time where the system does not report CPU time.
         cpu.push(if spent.cpu.is_zero() { spent.wall } else { spent.cpu }.as_secs_f64());
         wall.push(spent.wall.as_secs_f64());
         samples = rendered.sampled.samples();
@@ -96,10 +96,10 @@ pub(super) fn measure(subject: &Subject, plan: &Plan, reference: &Reference, set
     Row { setting, cpu, wall, samples, error, crop }
 }
 
-/// The part of the reference's own error, which is an estimate, below which an error is not told from 0.
+/// Part of the reference's estimated own error that serves as detection limit.
 const TOLD: f64 = 0.5;
 
-/// `pictures` are renderings of one setting, two at least.
+/// Error of one setting; `pictures` are its renderings, at least two.
 fn error(reference: &Reference, pictures: &[Vec<[f64; 4]>]) -> Error {
     let channels = reference.channels();
     let n = pictures.len() as f64;
@@ -120,7 +120,7 @@ fn error(reference: &Reference, pictures: &[Vec<[f64; 4]>]) -> Error {
     }
     let values = (reference.pixels.len() * channels).max(1) as f64;
     let noise = variance / values;
-    // No error is below how far the pictures lie around their mean, whatever a reference that is off itself makes of it.
+    // The error is no less than the spread of the pictures around their mean, even if the reference's own error is large.
     let square = (squares / values - reference.error * reference.error).max(noise * (n - 1.0) / n);
     let place = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
     let width = (reference.width as usize).max(1);
@@ -147,7 +147,7 @@ fn light(&[r, g, b, _]: &[f64; 4]) -> [f32; 3] {
     [r, g, b].map(|code| srgb::decode(code) as f32)
 }
 
-/// The pixels around a place, as many as there are.
+/// Crops the pixels around a position, clipped at the borders.
 fn cut(width: u32, pixels: &[[f64; 4]], (x, y): (u32, u32)) -> Picture {
     let columns = width as usize;
     let rows = pixels.len().checked_div(columns).unwrap_or(0);
@@ -181,7 +181,7 @@ mod tests {
     #[test]
     fn noise_and_bias_are_told_apart() {
         let noisy = error(&reference(0.0), &[all(0.4), all(0.6)]);
-        // The two vary by 0.1 around their mean; from two pictures the variance is estimated as twice that square.
+        // The two deviate by 0.1 from their mean; the variance estimated from two pictures is twice that squared.
         assert!((noisy.rmse - 0.1).abs() < 1e-12 && noisy.bias < 1e-9 && noisy.noise > 0.1);
         let biased = error(&reference(0.0), &[all(0.4), all(0.4)]);
         assert!((biased.bias - 0.1).abs() < 1e-12 && biased.noise == 0.0 && biased.flip > 0.0);

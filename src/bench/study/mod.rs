@@ -1,9 +1,9 @@
-//! What each knob buys: time against error, measured on one scene.
+//! Benefit of each knob: time against error, measured on one scene.
 //!
-//! Every setting renders the same view several times with different random numbers, and its pictures are compared with a
-//! reference that is as good as patience allows ([`mod@reference`]). What differs from rendering to rendering is noise,
-//! what they all have in common is bias ([`mod@measure`]). Settings that no other beats in both time and error are the
-//! front ([`front`]), and from these one is advised for each purpose ([`advice`]).
+//! Every setting renders the same view several times with different seeds, and its pictures are compared with a reference of as
+//! many samples as affordable ([`mod@reference`]). What differs between renderings is noise, what they have in common is bias
+//! ([`mod@measure`]). Settings that no other beats in both time and error form the front ([`front`]), and one of them is
+//! recommended for each purpose ([`advice`]).
 
 pub mod advice;
 pub mod front;
@@ -22,31 +22,31 @@ use knob::Setting;
 use measure::Row;
 use reference::Reference;
 
-/// What is rendered again and again.
+/// View that is rendered with every setting.
 #[derive(Clone, Copy)]
 pub struct Subject<'a> {
-    /// The scene as loaded, lit.
+    /// Scene as loaded, with lights.
     pub scene: &'a Scene,
-    /// The same placed for tracing.
+    /// The scene prepared for tracing.
     pub world: &'a World,
-    /// A structure over it.
+    /// Acceleration structure.
     pub accel: &'a AnyAccel<'a>,
-    /// Its textures.
+    /// Textures of the scene.
     pub textures: &'a TextureStore<'a>,
-    /// The eye.
+    /// Camera.
     pub view: &'a View,
-    /// What is not studied: size and whatever the scene asks for.
+    /// Settings that are not varied: picture size and whatever the scene asks for.
     pub base: &'a Settings,
-    /// Samples of every pixel that the scene asks for; `None`: stochastic sampling, of the usual quality.
+    /// Samples per pixel that the scene asks for; `None` for stochastic sampling of default quality.
     pub samples: Option<u32>,
-    /// The fewest samples of a pixel that stochastic sampling takes of it.
+    /// Minimum number of samples per pixel for stochastic sampling.
     pub fewest: u32,
-    /// How linear light becomes the picture whose error counts.
+    /// Output settings that turn linear light into the picture whose error counts.
     pub output: &'a Output,
 }
 
 impl<'a> Subject<'a> {
-    /// The job of rendering it with `settings`.
+    /// Job of rendering the subject with `settings`.
     fn job<'s>(&self, settings: &'s Settings, accel: &'s AnyAccel<'s>) -> Job<'s>
     where
         'a: 's,
@@ -54,70 +54,70 @@ impl<'a> Subject<'a> {
         Job { scene: self.scene, world: self.world, accel, textures: self.textures, view: self.view, settings }
     }
 
-    /// The numbers in which stochastic sampling counts errors: those of the study.
+    /// Space in which stochastic sampling measures errors: that of the study.
     fn space(&self) -> ErrorSpace {
         ErrorSpace::Display { tone_map: self.output.tone_map, exposure: self.output.exposure }
     }
 }
 
-/// How a study is done.
+/// Settings of a study.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
-    /// Renderings of each setting; 2 at least are done, as noise is what differs between them.
+    /// Renderings per setting; at least 2 are done, since noise is the difference between them.
     pub passes: u32,
-    /// Samples of each pixel of the reference.
+    /// Samples per pixel of the reference.
     pub reference_samples: u32,
-    /// Other numbers give other renderings.
+    /// Seed of the renderings.
     pub seed: u64,
 }
 
 impl Plan {
-    /// Renderings of each setting.
+    /// Number of renderings per setting.
     pub fn renderings(&self) -> u32 {
         self.passes.max(2)
     }
 
-    /// What is done unless something else is asked.
+    /// Default plan.
     pub const DEFAULT: Self = Self { passes: 3, reference_samples: 1024, seed: 0 };
 }
 
-/// What was found.
+/// Results of a study.
 #[derive(Clone, Debug)]
 pub struct Study {
-    /// The model as typed.
+    /// Model name as typed.
     pub name: String,
-    /// Of everything that was read.
+    /// Hash of everything that was read.
     pub hash: u128,
-    /// From where it was seen.
+    /// Camera in words.
     pub view: String,
-    /// Columns and rows of the pictures.
+    /// Width and height of the pictures in pixels.
     pub size: (u32, u32),
-    /// Threads that rendered.
+    /// Number of rendering threads.
     pub threads: usize,
-    /// How it was done.
+    /// Settings of the study.
     pub plan: Plan,
-    /// What pictures were compared with.
+    /// Reference picture.
     pub reference: Reference,
-    /// Every setting, in the order they were measured.
+    /// Results of all settings, in the order of measurement.
     pub rows: Vec<Row>,
     /// Whether every setting was measured.
     pub complete: bool,
 }
 
 impl Study {
-    /// Places of the rows that no other beats in time and error, from fast to exact. Errors that cannot be told from none
-    /// are equal.
+    /// Indices of the rows that no other beats in both time and error, from fast to exact. Errors below the detection limit count
+    /// as equal.
     pub fn front(&self) -> Vec<usize> {
         front::front(&self.rows.iter().map(|row| (row.cpu.median(), row.error.known())).collect::<Vec<_>>())
     }
 
-    /// Which settings to use for what.
+    /// Recommended settings by purpose.
     pub fn advice(&self) -> Vec<Advice> {
         advice::advice(self)
     }
 }
 
-/// Renders the reference; `None` when `go_on` says no. It hears how many renderings are done, of how many.
+/// Renders the reference; `None` when `go_on`, called with the numbers of finished and of all renderings, returns false.
 pub fn reference(subject: &Subject, plan: &Plan, go_on: &mut dyn FnMut(u32, u32) -> bool) -> Option<Reference> {
     Reference::render(subject, plan, go_on)
 }
@@ -127,12 +127,12 @@ pub fn measure(subject: &Subject, plan: &Plan, reference: &Reference, setting: S
     measure::measure(subject, plan, reference, setting)
 }
 
-/// Every setting that this scene can be studied with.
+/// All settings to study for this subject.
 pub fn settings(subject: &Subject) -> Vec<Setting> {
     knob::settings(subject)
 }
 
-/// A picture's file, for reports.
+/// Encodes a picture as PNG, for reports.
 pub(crate) fn png(picture: &Picture) -> Vec<u8> {
     let kind = crate::image::FileKind::Png;
     crate::image::encode(picture, kind, &crate::image::statistics::as_is(), &Metadata::default()).unwrap_or_default()

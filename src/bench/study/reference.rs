@@ -1,32 +1,32 @@
-//! What pictures are compared with.
+//! Reference picture of a study.
 
 use super::{Plan, Subject};
 use crate::image::{Developer, Picture};
 use crate::render::{Sampling, Settings, Stochastic, render};
 use crate::scene::MAX_DEPTH;
 
-/// Renderings with numbers of their own that a reference is the mean of.
+/// Number of renderings with different seeds that are averaged.
 const PARTS: u32 = 8;
 
-/// The mean of many samples of each pixel, every knob that cuts anything short turned up; gathered in double precision.
+/// Mean of many samples per pixel, with every knob that truncates light paths turned up; accumulated in double precision.
 #[derive(Clone, Debug)]
 pub struct Reference {
-    /// Columns.
+    /// Width in pixels.
     pub width: u32,
-    /// Codes 0..=1 of the picture as it is displayed, without a background over black, and coverage; row by row.
+    /// Display codes 0..=1 of the picture, over its background or else over black, and coverage; row by row.
     pub pixels: Vec<[f64; 4]>,
-    /// Whether some pixel is not covered in full, so that coverage counts.
+    /// Whether some pixel is not fully covered, so that coverage is compared too.
     pub is_transparent: bool,
-    /// Its own error: the standard error of the mean, estimated from its parts, as a root mean square.
+    /// Error of the reference itself: root mean square of the standard error of the mean, estimated from its parts.
     pub error: f64,
-    /// Samples of each pixel.
+    /// Samples per pixel.
     pub samples: u32,
 }
 
 impl Reference {
     pub(super) fn render(subject: &Subject, plan: &Plan, go_on: &mut dyn FnMut(u32, u32) -> bool) -> Option<Self> {
         let samples = (plan.reference_samples / PARTS).max(8);
-        // What a ray blurs stays blurred in the mean of all parts, whose own differences do not show it.
+        // Blur by ray footprints would remain in the mean of all parts without showing in their differences.
         let sharpness = Some(samples * PARTS);
         let how = Stochastic { min_samples: samples, max_samples: samples, sharpness, ..Stochastic::default() };
         let (mut sums, mut veils): (Vec<[f64; 4]>, Vec<[f64; 4]>) = (Vec::new(), Vec::new());
@@ -38,7 +38,7 @@ impl Reference {
             }
             let settings = Settings {
                 sampling: Sampling::Stochastic(Stochastic { space: subject.space(), ..how }),
-                // No rendering that is compared with it has these numbers.
+                // No compared rendering uses these seeds.
                 seed: plan.seed.wrapping_add(0x5eed_0000 + u64::from(part)),
                 depth: subject.base.depth.and(Some(MAX_DEPTH)).or(deep(subject)),
                 cutoff: 1e-6,
@@ -59,13 +59,13 @@ impl Reference {
         Some(Self { width, pixels, is_transparent, error, samples: samples * PARTS })
     }
 
-    /// Channels that are compared: 3, or 4 with coverage.
+    /// Number of channels compared: 3, or 4 with coverage.
     pub fn channels(&self) -> usize {
         channels(self.is_transparent)
     }
 }
 
-/// Adds the share of one part.
+/// Adds one part, weighted by 1 / [`PARTS`].
 fn add<const N: usize>(sums: &mut Vec<[f64; N]>, part: &[[f32; N]]) {
     sums.resize(part.len(), [0.0; N]);
     for (sum, pixel) in sums.iter_mut().zip(part) {
@@ -78,7 +78,7 @@ fn means<const N: usize>(sums: &[[f64; N]]) -> Vec<[f32; N]> {
     sums.iter().map(|sum| sum.map(|c| c as f32)).collect()
 }
 
-/// Bounces that leave nothing out; `None` where the scene needs none at all.
+/// Maximum depth, to leave nothing out; `None` where the scene needs no bounces.
 fn deep(subject: &Subject) -> Option<u32> {
     use crate::scene::features::{Feature, Features};
     let features = Features::of(subject.scene);
@@ -90,7 +90,7 @@ fn channels(is_transparent: bool) -> usize {
     if is_transparent { 4 } else { 3 }
 }
 
-/// The codes of a picture as it is displayed: before its background, or as they are laid over black.
+/// Display codes of a picture, over its background or else over black.
 pub(super) fn codes(picture: &Picture, subject: &Subject) -> Vec<[f64; 4]> {
     let developer = Developer::new(subject.output);
     let veil = |i: usize| picture.veil.get(i).filter(|_| subject.output.background.is_some());
@@ -101,7 +101,7 @@ pub(super) fn codes(picture: &Picture, subject: &Subject) -> Vec<[f64; 4]> {
     picture.beauty.iter().enumerate().map(coded).map(|pixel| pixel.map(f64::from)).collect()
 }
 
-/// Of the mean of all parts, over all pixels and channels.
+/// Standard error of the mean of all parts, over all pixels and channels.
 fn standard_error(parts: &[Vec<[f64; 4]>], channels: usize) -> f64 {
     let n = parts.len() as f64;
     let pixels = parts.first().map_or(0, Vec::len);

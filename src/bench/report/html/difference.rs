@@ -1,4 +1,4 @@
-//! The difference image: where one structure tests more than another.
+//! Difference image of the test counts of two structures.
 
 use super::super::{Model, Report};
 use super::heat::indexed;
@@ -9,13 +9,13 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write;
 
-/// Blue, white, orange, which people with any kind of colour sight tell apart; darker the farther from no difference.
+/// Blue, white, orange: distinguishable with any kind of colour vision; darker with growing difference.
 const COLORS: [[u8; 3]; 5] = [[0, 58, 112], [92, 164, 214], [247, 247, 247], [242, 158, 84], [150, 54, 0]];
 
-/// The place of no difference among 255.
+/// Palette index of no difference, in 0 to 254.
 const MIDDLE: f64 = 127.0;
 
-/// Two structures in one image; nothing where there are no two with maps.
+/// Figure of the difference of two structures; empty without two structures that have maps.
 pub(super) fn figure(report: &Report, model: &Model) -> String {
     let Some([a, b]) = pair(report, model) else { return asked_in_vain(report) };
     let differences: Vec<i64> =
@@ -42,7 +42,7 @@ pub(super) fn figure(report: &Report, model: &Model) -> String {
     )
 }
 
-/// Those that were asked for; else the two fast ones, or the first two that have maps.
+/// Requested pair of structures; by default the two fast ones, or else the first two that have maps.
 fn pair<'a>(report: &Report, model: &'a Model) -> Option<[&'a Row; 2]> {
     let mapped = || model.rows.iter().filter(|r| !r.tests_by_pixel.is_empty());
     let find = |kind: AccelKind| mapped().find(|r| r.kind == kind);
@@ -63,14 +63,14 @@ fn asked_in_vain(report: &Report) -> String {
     )
 }
 
-/// The place of a difference, 0 to 254.
+/// Palette index of a difference, 0 to 254.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 254")]
 fn place(difference: i64, max: u64) -> u8 {
     let part = libm::log1p(difference.unsigned_abs() as f64) / libm::log1p(max as f64);
     (MIDDLE + MIDDLE * part.min(1.0) * difference.signum() as f64).round() as u8
 }
 
-/// Between the two nearest of [`COLORS`].
+/// Interpolates linearly in [`COLORS`].
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two bytes")]
 fn color(place: u8) -> [u8; 3] {
     let along = (f64::from(place) / (2.0 * MIDDLE)).min(1.0) * (COLORS.len() - 1) as f64;
@@ -80,7 +80,7 @@ fn color(place: u8) -> [u8; 3] {
     [0, 1, 2].map(|k| (f64::from(a[k]) * (1.0 - part) + f64::from(b[k]) * part).round() as u8)
 }
 
-/// The colours with their numbers, and what the ends mean.
+/// Colour scale with numbers and the meaning of its ends.
 fn legend(max: u64, first: AccelKind) -> String {
     const LEFT: f64 = 36.0;
     const LONG: f64 = 400.0;
@@ -130,7 +130,7 @@ mod tests {
         assert_eq!([color(0), color(127), color(254)], [COLORS[0], COLORS[2], COLORS[4]]);
         let light = |p: u8| color(p).iter().map(|&c| u32::from(c)).sum::<u32>();
         assert!((0..120).step_by(5).all(|p| light(p) < light(p + 5) && light(254 - p) < light(249 - p)));
-        // Blue on one side, orange on the other: more red than blue is what all kinds of sight see differ.
+        // More red than blue is a contrast that all kinds of colour vision perceive.
         assert!(color(60)[2] > color(60)[0] + 50 && color(200)[0] > color(200)[2] + 50);
     }
 }

@@ -1,4 +1,4 @@
-//! How cost grows with size: plots and tables.
+//! Growth of cost with size: plots and tables.
 
 use super::super::Report;
 use super::super::cost::{Cost, costs};
@@ -8,7 +8,7 @@ use super::svg::{plain, power, unit};
 use super::{escaped, figure, table};
 use crate::number::{bytes, grouped, short};
 
-/// The section; nothing where the models are not a family in growing sizes.
+/// Growth section; empty if the models are not a family in growing sizes.
 pub(super) fn section(report: &Report) -> String {
     let (Some(family), false) = (report.family, report.models.is_empty()) else { return String::new() };
     let sizes: Vec<String> = report.models.iter().map(|m| grouped(m.prims as u64)).collect();
@@ -41,7 +41,7 @@ fn curves(report: &Report, cost: Cost) -> String {
     figure(cost.title(), &caption, &svg)
 }
 
-/// A round value of a cost.
+/// Label of a tick of a cost axis.
 pub(super) fn tick(cost: Cost, value: f64) -> String {
     match cost {
         Cost::Tests | Cost::Visits if value >= 1e5 => power(value),

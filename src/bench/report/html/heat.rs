@@ -1,4 +1,4 @@
-//! Heat maps: the tests in each pixel, by one scale for all structures.
+//! Heat maps: tests per pixel, on one scale for all structures.
 
 use super::super::{Model, Report};
 use super::tables::name;
@@ -9,12 +9,12 @@ use base64::engine::general_purpose::STANDARD;
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError};
 use std::fmt::Write;
 
-/// Colours of counts up to `max`.
+/// Colour scale of counts up to `max`.
 fn scale_to(max: u32) -> Scale {
     Scale::new(f64::from(max), 1.0)
 }
 
-/// One map for each structure that got all rays; nothing where there is none.
+/// One map for each structure that got all rays; empty without any.
 pub(super) fn figure(report: &Report, model: &Model) -> String {
     let rows: Vec<_> = model.rows.iter().filter(|r| !r.tests_by_pixel.is_empty()).collect();
     let highest = rows.iter().flat_map(|r| &r.tests_by_pixel).copied().max().unwrap_or(0);
@@ -51,7 +51,7 @@ fn picture(tests: &[u32], width: u32, height: u32, scale: Scale) -> Result<Vec<u
     indexed(&pixels, width, height, color)
 }
 
-/// A PNG whose pixels are places in a palette.
+/// Encodes palette indices as a PNG.
 pub(super) fn indexed(
     pixels: &[u8],
     width: u32,
@@ -70,7 +70,7 @@ pub(super) fn indexed(
     Ok(file)
 }
 
-/// The colours with their numbers.
+/// Colour scale with numbers.
 fn legend(scale: Scale) -> String {
     let mut svg = String::from(
         "<svg class=\"scale\" viewBox=\"0 0 440 36\" role=\"img\" aria-label=\"scale of the maps\"><defs><linearGradient id=\"heat\">",

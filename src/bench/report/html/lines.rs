@@ -1,36 +1,36 @@
-//! Plots of lines, one for each structure: a cost against a size or a parameter.
+//! Line plots, one line per structure: a cost against a size or a parameter.
 
 use super::svg::{Scale, open, rule, spread_out, words};
 use crate::accel::AccelKind;
 use std::fmt::Write;
 
-/// One structure's line.
+/// Line of one structure.
 pub(super) struct Series {
-    /// Gives it colour and marks.
+    /// Structure, which determines colour and marks.
     pub(super) kind: AccelKind,
-    /// By ascending x; what is 0 cannot be shown.
+    /// Points by ascending x; y = 0 cannot be shown.
     pub(super) points: Vec<(f64, f64)>,
-    /// Its name, and a number that belongs to it.
+    /// Name of the line, with a number.
     pub(super) label: String,
-    /// The x of a point with a circle around it.
+    /// X of the point to circle.
     pub(super) ringed: Option<f64>,
-    /// The x of a point with a square around it.
+    /// X of the point to frame with a square.
     pub(super) boxed: Option<f64>,
-    /// A y of no x, drawn across.
+    /// Y of a horizontal line across the plot.
     pub(super) level: Option<f64>,
 }
 
-/// What a plot shows.
+/// Contents of a plot.
 pub(super) struct Lines<'a> {
-    /// For those who do not see it.
+    /// Accessible label.
     pub(super) label: &'a str,
-    /// What x is.
+    /// Label of the x axis.
     pub(super) below: &'a str,
-    /// Whether x is its own scale, and not its logarithm.
+    /// Whether the x axis is linear; otherwise logarithmic.
     pub(super) is_even: bool,
-    /// How a value of x and a value of y are written.
+    /// Formatters of x and y values.
     pub(super) shown: [&'a dyn Fn(f64) -> String; 2],
-    /// The lines.
+    /// Lines of the plot.
     pub(super) series: Vec<Series>,
 }
 
@@ -39,7 +39,7 @@ const RIGHT: f64 = 292.0;
 const TOP: f64 = 12.0;
 const BOTTOM: f64 = 300.0;
 
-/// Names stand in a column of their own, in the order of the lines' ends, so that none covers another.
+/// Plots the lines. Names stand in a separate column in the order of the lines' ends, so that none overlap.
 pub(super) fn plot(lines: &Lines) -> String {
     let points = || lines.series.iter().flat_map(|s| s.points.iter().copied()).filter(|p| p.1 > 0.0);
     let x = match lines.is_even {
@@ -107,12 +107,12 @@ fn line(svg: &mut String, series: &Series, lines: &Lines, x: &Scale, y: &Scale) 
     }
 }
 
-/// A mark alone, for the names.
+/// Mark for the legend.
 fn sample(svg: &mut String, kind: AccelKind, x: f64, y: f64) {
     mark(svg, kind, x, y, kind.name());
 }
 
-/// Colour and shape of a structure: no two have the same shape.
+/// Draws a mark in the structure's colour and shape; no two structures share a shape.
 fn mark(svg: &mut String, kind: AccelKind, x: f64, y: f64, title: &str) {
     let shape = match kind {
         AccelKind::None => "M-4-4L4 4M-4 4L4-4",

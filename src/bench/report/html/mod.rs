@@ -1,4 +1,4 @@
-//! One page for a browser: no script, nothing to fetch, readable on a phone, in the dark and on paper.
+//! Report as one HTML page: no script, self-contained, readable on phones, in dark mode and on paper.
 
 mod difference;
 mod growth;
@@ -14,11 +14,11 @@ use crate::accel::AccelKind;
 use crate::bench::row::Row;
 use crate::number::{grouped, seconds, short};
 
-/// Rules of the page. The colours of the classes are M. Okabe and K. Ito's, which people with any kind of colour sight
-/// tell apart; each class has a shape of its own too.
+/// Style sheet of the page. The class colours are M. Okabe and K. Ito's, distinguishable with any kind of colour vision; each
+/// class also has its own shape.
 const STYLE: &str = include_str!("style.css");
 
-/// A page of our look under this title.
+/// HTML page with this title in the common style.
 pub fn page(title: &str, body: &str) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
@@ -27,12 +27,12 @@ pub fn page(title: &str, body: &str) -> String {
     )
 }
 
-/// A paragraph of a sentence.
+/// Paragraph of one sentence.
 pub fn paragraph(sentence: &str) -> String {
     format!("<p>{}.</p>\n", escaped(sentence))
 }
 
-/// The page.
+/// Writes the page of a report.
 pub fn write(report: &Report) -> String {
     let mut out =
         "<p>The rays of one picture of a model, sent through every structure: are the hits the same, and what \
@@ -51,7 +51,7 @@ pub fn write(report: &Report) -> String {
     page("meshray bench", &(out + &notes(report)))
 }
 
-/// One of many models, to be opened by who wants it.
+/// Section of one of many models, collapsed.
 fn folded(model: &Model, section: &str) -> String {
     format!(
         "<details><summary>{}: {} prims</summary>\n{section}</details>\n",
@@ -104,14 +104,14 @@ fn rays_line(model: &Model) -> String {
     model.rays.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
-/// Structures that would take the plot's scale from the others.
+/// Names the structures too slow for the scale of the plot, with their times.
 fn far_off(model: &Model) -> String {
     let slow = model.rows.iter().filter(|r| r.sampled);
     let told: Vec<String> = slow.map(|r| format!("{} ({} a ray)", r.kind, seconds(model.seconds_per_ray(r)))).collect();
     if told.is_empty() { String::new() } else { format!(" Far above: {}.", told.join(", ")) }
 }
 
-/// What somebody should know who reads one paragraph only.
+/// Summary in one paragraph.
 fn glance(report: &Report, model: &Model) -> String {
     let rated: Vec<&Row> = model.rows.iter().filter(|r| !r.sampled).collect();
     let tests = |row: &Row| {
@@ -146,7 +146,7 @@ fn figure(title: &str, caption: &str, svg: &str) -> String {
     format!("<figure><h3>{title}</h3><figcaption>{caption}</figcaption>{svg}</figure>\n")
 }
 
-/// A table with its title.
+/// HTML table with its title.
 pub fn table(shown: &Table) -> String {
     let head: String = shown.columns.iter().map(|title| format!("<th scope=\"col\">{}</th>", escaped(title))).collect();
     let line = |cells: &Vec<String>| {
@@ -172,7 +172,7 @@ fn notes(report: &Report) -> String {
     )
 }
 
-/// Text that cannot be taken for markup.
+/// Escapes text for HTML.
 pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,4 +1,4 @@
-//! Plots of one model: what each structure costs.
+//! Plots of one model: the cost of each structure.
 
 use super::super::Model;
 use super::svg::{Scale, WIDTH, open, rule, spread_out, unit, words};
@@ -8,7 +8,7 @@ use crate::bench::row::Row;
 use crate::number::{grouped, seconds, short};
 use std::fmt::Write;
 
-/// Each structure a row, each class a mark: its tests a ray.
+/// Plot of ray/prim tests per ray: one row per structure, one mark per class.
 pub(super) fn tests(model: &Model) -> String {
     const LEFT: f64 = 92.0;
     const ROW: f64 = 40.0;
@@ -41,7 +41,7 @@ pub(super) fn tests(model: &Model) -> String {
     svg + "</svg>"
 }
 
-/// Each structure a point: seconds to build, seconds for a ray.
+/// Scatter plot with one point per structure: build time against time per ray, in seconds.
 pub(super) fn times(model: &Model) -> String {
     const LEFT: f64 = 62.0;
     const RIGHT: f64 = 330.0;
@@ -61,7 +61,7 @@ pub(super) fn times(model: &Model) -> String {
     }
     words(&mut svg, (LEFT + RIGHT) * 0.5, BOTTOM + 34.0, "middle", "soft", "time to build; up: time of a ray");
 
-    // Names stand in a column of their own, in the order of the points, so that none covers another.
+    // Names stand in a separate column, in the order of the points, so that none overlap.
     rows.sort_by(|a, b| model.seconds_per_ray(b).total_cmp(&model.seconds_per_ray(a)));
     let places: Vec<f64> = rows.iter().map(|r| y.at(model.seconds_per_ray(r))).collect();
     for (row, (place, label)) in rows.iter().zip(places.iter().zip(spread_out(&places, 15.0, BOTTOM))) {
@@ -82,7 +82,7 @@ pub(super) fn times(model: &Model) -> String {
     svg + "</svg>"
 }
 
-/// The marks and their names in two lines.
+/// Legend of the marks, in two lines.
 fn legend(svg: &mut String, model: &Model) {
     for (i, rays) in model.rays.iter().enumerate() {
         let (x, y) = (100.0 + 112.0 * (i % 3) as f64, 12.0 + 18.0 * (i / 3) as f64);
@@ -91,7 +91,7 @@ fn legend(svg: &mut String, model: &Model) {
     }
 }
 
-/// Colour and shape of a class.
+/// Draws a mark in the class's colour and shape.
 fn mark(svg: &mut String, class: Class, x: f64, y: f64, title: &str) {
     let shape = match class {
         Class::Primary => "M-4.5 0a4.5 4.5 0 1 0 9 0a4.5 4.5 0 1 0-9 0z",

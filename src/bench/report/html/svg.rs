@@ -1,12 +1,12 @@
-//! Scales, lines and words of plots as SVG, small enough for a phone: 440 units wide.
+//! SVG scales, lines and text of plots, small enough for a phone: 440 units wide.
 
 use crate::number::short;
 use std::fmt::Write;
 
-/// Units across.
+/// Width of a plot in SVG units.
 pub(crate) const WIDTH: f64 = 440.0;
 
-/// From `low` to `high` along `from..to`: logarithms to the base of ten, or values themselves.
+/// Maps values (linear) or their decimal logarithms in `low..high` to coordinates `from..to`.
 pub(crate) struct Scale {
     low: f64,
     high: f64,
@@ -16,7 +16,7 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    /// Whole decades around the values that are above 0.
+    /// Logarithmic scale of whole decades around the positive values.
     pub(crate) fn around(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for log in values.filter(|v| *v > 0.0 && v.is_finite()).map(f64::log10) {
@@ -29,20 +29,20 @@ impl Scale {
         Self { low, high: high.max(low + 1.0), from, to, is_even: false }
     }
 
-    /// Just around the values, with one more part in ten on both sides, and nearly a decade at least.
+    /// Logarithmic scale of the values with a margin of a tenth of their range on both sides, nearly a decade at least.
     pub(crate) fn fitting(values: impl Iterator<Item = f64> + Clone, from: f64, to: f64) -> Self {
         let tight = Self::tight(values, from, to);
         let (middle, half) = ((tight.low + tight.high) * 0.5, ((tight.high - tight.low) * 0.6).max(0.4));
         Self { low: middle - half, high: middle + half, ..tight }
     }
 
-    /// From the least value to the most; a factor of 1.6 at least.
+    /// Logarithmic scale from the least value to the greatest; spans at least a factor of 1.6.
     pub(crate) fn tight(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let logs = values.filter(|v| *v > 0.0 && v.is_finite()).map(f64::log10);
         Self { is_even: false, ..Self::between(logs, 0.2, from, to) }
     }
 
-    /// From the least value to the most, themselves and not their logarithms.
+    /// Linear scale from the least value to the greatest.
     pub(crate) fn even(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         Self { is_even: true, ..Self::between(values, 1.0, from, to) }
     }
@@ -54,14 +54,14 @@ impl Scale {
         Self { low: low - more, high: high + more, from, to, is_even: false }
     }
 
-    /// Where a value lies; what is 0 or below the scale lies at its start.
+    /// Coordinate of a value, clamped to the scale; 0 maps to the start of a logarithmic scale.
     pub(crate) fn at(&self, value: f64) -> f64 {
         let value = if self.is_even { value } else { value.max(1e-300).log10() };
         let part = (value - self.low) / (self.high - self.low);
         self.from + part.clamp(0.0, 1.0) * (self.to - self.from)
     }
 
-    /// Round values: whole decades where there are many, parts of them where there are few.
+    /// Tick values: whole decades on long scales, parts of them on short ones.
     pub(crate) fn ticks(&self) -> Vec<f64> {
         let span = self.high - self.low;
         if self.is_even {
@@ -81,7 +81,7 @@ impl Scale {
         }
     }
 
-    /// Of `step`, from the first on the scale.
+    /// Values at distance `step` from the first integer on the scale.
     fn multiples(&self, step: f64) -> Vec<f64> {
         let first = (self.low - 1e-9).ceil();
         (0..).map(|i| first + f64::from(i) * step).take_while(|v| *v <= self.high + 1e-9).collect()
@@ -95,7 +95,7 @@ impl Scale {
     }
 }
 
-/// A round number of seconds: `20 µs`.
+/// Formats round seconds with a unit: `20 µs`.
 pub(crate) fn unit(seconds: f64) -> String {
     let scaled = |factor: f64, unit: &str| format!("{} {unit}", plain(&short(seconds * factor)));
     match seconds {
@@ -106,17 +106,17 @@ pub(crate) fn unit(seconds: f64) -> String {
     }
 }
 
-/// A large round number: `2e5`.
+/// Formats a large round number: `2e5`.
 pub(crate) fn power(number: f64) -> String {
     format!("{number:.1e}").replace(".0e", "e")
 }
 
-/// A number without noughts to spare: `1.50` as `1.5`.
+/// Strips trailing zeros: `1.50` becomes `1.5`.
 pub(crate) fn plain(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
-/// Ascending places moved apart by at least `gap`, none beyond `end`.
+/// Moves ascending positions apart by at least `gap`, none beyond `end`.
 pub(crate) fn spread_out(places: &[f64], gap: f64, end: f64) -> Vec<f64> {
     let mut moved: Vec<f64> = Vec::new();
     for &place in places {

@@ -1,4 +1,4 @@
-//! What a parameter costs over its values: the U-shaped curves.
+//! Cost of a parameter over its values: the U-shaped curves.
 
 use super::super::cost::{Cost, costs};
 use super::super::sweep::{Curve, curves, sentences, tables};
@@ -10,7 +10,7 @@ use super::{escaped, figure, table};
 use crate::bench::row::Row;
 use crate::bench::sweep::Sweep;
 
-/// What stands in the place of the usual figures where a parameter is swept.
+/// Figures of a parameter sweep, which replace the usual ones.
 pub(super) fn figures(report: &Report, model: &Model, sweep: &Sweep) -> String {
     let said: String = sentences(report, model).iter().map(|text| format!("<p>{}.</p>\n", escaped(text))).collect();
     let plots: String = costs(report).map(|cost| one(report, model, sweep, cost)).collect();
