@@ -1,31 +1,31 @@
-//! One parameter of the structures at several values: where is the bottom of the curve, and is the default there?
+//! Sweep of one structure parameter over several values: where is the minimum of the cost, and is the default there?
 
 use super::range::{Spacing, values};
 use crate::accel::{AccelKind, AccelParams};
 use std::fmt;
 use std::str::FromStr;
 
-/// A parameter that is a number.
+/// Numeric parameter of the structures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parameter {
     /// Cells of the top grid per prim.
     GridDensity,
-    /// Most cells of the top grid along an axis.
+    /// Maximum number of cells of the top grid per axis.
     GridResolution,
-    /// Most levels of an octree.
+    /// Maximum number of levels of an octree.
     MaxDepth,
     /// Cost of visiting a cell, in tests.
     StepCost,
-    /// Most prims of a leaf.
+    /// Maximum number of prims of a leaf.
     LeafSize,
 }
 
 impl Parameter {
-    /// Every one.
+    /// All parameters.
     pub const ALL: [Self; 5] =
         [Self::GridDensity, Self::GridResolution, Self::MaxDepth, Self::StepCost, Self::LeafSize];
 
-    /// Its flag, without the dashes.
+    /// Flag of the parameter, without the dashes.
     pub const fn name(self) -> &'static str {
         match self {
             Self::GridDensity => "grid-density",
@@ -36,17 +36,17 @@ impl Parameter {
         }
     }
 
-    /// Whether its values are whole.
+    /// Whether the values are whole numbers.
     pub const fn is_whole(self) -> bool {
         matches!(self, Self::GridResolution | Self::MaxDepth | Self::LeafSize)
     }
 
-    /// Whether it is a logarithm itself, so that its values are spread evenly: each level halves the cells.
+    /// Whether the parameter is a logarithm itself, so that its values are spaced evenly: each level halves the cells.
     pub const fn is_even(self) -> bool {
         matches!(self, Self::MaxDepth)
     }
 
-    /// Whether it changes a structure of this kind with these other parameters.
+    /// Whether the parameter affects a structure of this kind, given the other parameters.
     pub fn changes(self, kind: AccelKind, params: &AccelParams) -> bool {
         let has_it = match self {
             Self::GridDensity | Self::GridResolution => kind.has_grid(),
@@ -56,7 +56,7 @@ impl Parameter {
         has_it && self.overruled_by(params).is_none()
     }
 
-    /// The flag (without dashes) that fixes what this parameter would decide, if it is among these.
+    /// Flag (without dashes) among `params` that fixes what this parameter would decide.
     pub const fn overruled_by(self, params: &AccelParams) -> Option<&'static str> {
         match self {
             Self::GridDensity | Self::GridResolution if params.grid_cells.is_some() => Some("grid-cells"),
@@ -65,7 +65,7 @@ impl Parameter {
         }
     }
 
-    /// Its value for this kind when nothing is asked for; `None` where another parameter rules instead.
+    /// Default value for a kind of structure; `None` where another parameter decides instead.
     pub fn default_of(self, kind: AccelKind, params: &AccelParams) -> Option<f64> {
         let grid = params.grid(kind);
         match self {
@@ -79,7 +79,7 @@ impl Parameter {
         }
     }
 
-    /// Whether it is asked for already.
+    /// Whether `params` sets the parameter explicitly.
     pub fn is_set(self, params: &AccelParams) -> bool {
         match self {
             Self::GridDensity => params.density.is_some(),
@@ -115,16 +115,16 @@ impl fmt::Display for Parameter {
     }
 }
 
-/// A parameter and the values it takes in turn.
+/// A parameter and the values it takes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
-    /// Which one.
+    /// Parameter.
     pub parameter: Parameter,
-    /// Ascending, each once.
+    /// Values, ascending, each once.
     pub values: Vec<f64>,
 }
 
-/// Values of a range that names no number of them.
+/// Number of values of a range that does not name one.
 const VALUES: usize = 6;
 
 impl FromStr for Sweep {
@@ -146,14 +146,14 @@ impl FromStr for Sweep {
     }
 }
 
-/// The value of the swept parameter in one structure.
+/// Value of the swept parameter in one structure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
-    /// Which parameter.
+    /// Parameter.
     pub parameter: Parameter,
-    /// `None`: another parameter rules instead.
+    /// Value; `None` where another parameter decides instead.
     pub value: Option<f64>,
-    /// Whether the structure has it when nothing is asked for.
+    /// Whether the value is the structure's default.
     pub is_default: bool,
 }
 
@@ -167,7 +167,7 @@ impl fmt::Display for Setting {
 }
 
 impl Sweep {
-    /// Each value for a structure of this kind, and the default, which may lie outside of them.
+    /// Settings of a structure of this kind: each value, and the default, which may lie outside the values.
     pub fn settings(&self, kind: AccelKind, params: &AccelParams) -> Vec<(Setting, AccelParams)> {
         let (parameter, default) = (self.parameter, self.parameter.default_of(kind, params));
         let mut values: Vec<Option<f64>> = self.values.iter().copied().map(Some).collect();
@@ -225,7 +225,7 @@ mod tests {
         };
         assert_eq!(values(AccelKind::Grid), [(Some(1.0), false, Some(1.0)), (Some(4.0), true, Some(4.0))]);
         assert_eq!(values(AccelKind::GridOctree)[0], (Some(0.25), true, Some(0.25)));
-        // Octrees have no leaf size unless it is asked for.
+        // Octrees have no leaf size by default.
         let sweep: Sweep = "leaf-size=8".parse().unwrap();
         let settings = sweep.settings(AccelKind::Octree, &AccelParams::DEFAULT);
         assert_eq!((settings[1].0.value, settings[1].0.is_default, settings[1].1), (None, true, AccelParams::DEFAULT));

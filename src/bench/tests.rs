@@ -28,7 +28,7 @@ faces=[[0,2,1],[0,3,2],[4,5,6],[4,6,7],[0,1,5],[0,5,4],[3,7,6],[3,6,2],[0,4,7],[
 
 const SIZE: (u32, u32) = (24, 18);
 
-/// A scene of which pictures can be taken.
+/// A scene with everything needed to render it.
 struct Stage {
     scene: Scene,
     world: World,
@@ -71,7 +71,7 @@ impl Stage {
         compare(&self.world, filters.as_ref(), rays, (SIZE.0 * SIZE.1) as usize, plan, &mut |_, _| true).unwrap()
     }
 
-    /// The whole way.
+    /// Records, compares and reports with every structure of the plan.
     fn report(&self, plan: Plan) -> Report {
         let rays = self.rays();
         let model = Model {
@@ -142,7 +142,7 @@ fn replayed_rays_cost_what_the_renderer_counts() {
     }
 }
 
-/// Overlooks the hits with one prim.
+/// Structure that misses all hits with one prim.
 struct Blind<'a>(Unculled<'a>, u32);
 
 impl Accel for Blind<'_> {
@@ -177,7 +177,7 @@ fn a_structure_that_loses_hits_is_noticed() {
     assert_eq!(lost, task.set.batches[0].rays.len() as u64 - misses(&whole, &task.set), "every hit is lost once");
 }
 
-/// Eye rays that hit nothing at first, counted by hand.
+/// Number of rays of the first batch that miss everything.
 fn misses(whole: &Unculled, set: &RaySet) -> u64 {
     let rays = &set.batches[0].rays;
     let mut hits = vec![Hit::MISS; rays.len()];
@@ -195,7 +195,7 @@ fn a_slow_structure_gets_a_sample_with_its_interval() {
     let none = rows.iter().find(|r| r.kind == AccelKind::None).unwrap();
     assert!(none.sampled && none.tests_by_pixel.is_empty());
     assert!(none.classes.iter().all(|c| (30..=32).contains(&c.counts.queries)));
-    // The true mean of what was left out lies in the interval, or near it: it is one of 95 %.
+    // The true mean lies in the 95 % interval or, as that may fail, near it.
     let all = stage.rows(&rays, &plan());
     let shadow = (&none.classes[1], &all[0].classes[1]);
     let off = (shadow.0.per_ray(Count::It) - shadow.1.per_ray(Count::It)).abs();

@@ -1,7 +1,7 @@
-//! `--again`: the settings a picture carries, and how they become a command line once more.
+//! `--again`: turns the settings stored in a picture back into a command line.
 //!
-//! Settings are stored as the flags that repeat them, with the values that were used (an `auto` depth as the depth it
-//! became). A picture may come from a stranger, so only flags that shape pixels are taken from it: never names of
+//! Settings are stored as the flags that repeat them, with the values that were used (an `auto` depth as the depth it resolved
+//! to). Since a picture may come from an untrusted source, only flags that shape pixels are taken from it: never names of
 //! outputs, folders or limits.
 
 use super::archives;
@@ -27,7 +27,7 @@ use clap::Parser;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
-/// The flags that a picture may bring along.
+/// Flags that may be taken from a picture.
 const FLAGS: [&str; 65] = [
     "size",
     "aa",
@@ -96,25 +96,25 @@ const FLAGS: [&str; 65] = [
     "allow-empty",
 ];
 
-/// What there is to say about the making of a picture.
+/// Everything about the making of a picture that its metadata records.
 pub(super) struct Making<'a> {
     /// The whole job.
     pub job: &'a RenderJob,
-    /// The inputs.
+    /// Inputs.
     pub batch: &'a Batch,
-    /// The picture.
+    /// Picture.
     pub shot: &'a Shot,
     /// Settings as used.
     pub effective: &'a Effective,
-    /// What came of them.
+    /// Sampling results.
     pub sampled: &'a Sampled,
     /// Depth as used.
     pub depth: u32,
     /// Structure as used.
     pub accel: AccelKind,
-    /// Why that, if it was chosen by counts.
+    /// Reason for the structure, if it was chosen by counts.
     pub reason: Option<Reason>,
-    /// What was loaded.
+    /// Loaded scene.
     pub loaded: &'a Loaded,
 }
 
@@ -129,7 +129,7 @@ impl Making<'_> {
         hash(self.loaded.facts.hash)
     }
 
-    /// The flags that render the same picture again.
+    /// Flags that render the same picture again.
     fn settings(&self) -> Map<String, Value> {
         let settings = &self.effective.settings;
         let mut flags = Map::new();
@@ -161,7 +161,7 @@ impl Making<'_> {
 }
 
 impl Making<'_> {
-    /// From where it is seen.
+    /// Sets the flags of the camera.
     fn set_view(&self, mut set: impl FnMut(&str, String)) {
         match &self.shot.choice {
             Choice::Default => {}
@@ -180,7 +180,7 @@ impl Making<'_> {
         }
     }
 
-    /// What is behind and around it, and the rays that light from there and from lamps takes.
+    /// Sets the flags of background, environment, and rays to environment and lamps.
     fn set_surroundings(&self, mut set: impl FnMut(&str, String)) {
         let (look, settings) = (&self.job.look, &self.effective.settings);
         match look.background {
@@ -205,7 +205,7 @@ impl Making<'_> {
         look.sun_size.iter().for_each(|size| set("sun-size", size.to_string()));
     }
 
-    /// How it is developed and written.
+    /// Sets the flags of development and file format.
     fn set_written(&self, mut set: impl FnMut(&str, String)) {
         let output = &self.effective.output;
         set("tone-map", output.tone_map.name().into());
@@ -216,7 +216,7 @@ impl Making<'_> {
         }
     }
 
-    /// What of the file is shown, when, and how it is read.
+    /// Sets the flags that select the part of the file, the moment, and the way of loading.
     fn set_loading(&self, mut set: impl FnMut(&str, String)) {
         let load = &self.job.load;
         load.up.iter().for_each(|up| set("up", if *up == UpAxis::Y { "y" } else { "z" }.into()));
@@ -233,7 +233,7 @@ impl Making<'_> {
         }
     }
 
-    /// What finds its hits.
+    /// Sets the flags of acceleration structure and intersector.
     fn set_structure(&self, mut set: impl FnMut(&str, String)) {
         set("accel", self.accel.name().into());
         set("intersector", self.job.intersector.name().into());
@@ -253,7 +253,7 @@ impl Making<'_> {
         }
     }
 
-    /// The moment that is shown, and the sequence whose camera it has.
+    /// Sets the flags of the moment and of the sequence that determines the camera.
     fn set_step(&self, mut set: impl FnMut(&str, String)) {
         let step = &self.shot.step;
         let number = step.number.unwrap_or_default();
@@ -277,21 +277,21 @@ fn vector(v: DVec3) -> String {
     format!("{},{},{}", v.x, v.y, v.z)
 }
 
-/// Degrees that are read back as just so many radians: as they were typed, where that is a number of few digits.
+/// Degrees that convert back to exactly the same radians; the value as typed, if it has few digits.
 fn degrees(radians: f64) -> String {
     let exact = radians.to_degrees();
     let typed = (exact * 1e9).round() / 1e9;
     if typed.to_radians() == radians { typed } else { exact }.to_string()
 }
 
-/// What a finished picture says about itself.
+/// Metadata of a finished picture.
 pub(super) fn metadata(making: &Making, counted: Option<&Counted>) -> Metadata {
     let metadata = Metadata::new()
         .with(Metadata::SETTINGS, Value::Object(making.settings()).to_string())
         .with(Metadata::INPUT, Value::from(making.inputs()).to_string())
         .with(Metadata::INPUT_HASH, making.hash());
     let made_of = match &making.job.again {
-        // As that of the picture that is repeated.
+        // A repeated picture keeps the entry of its original.
         Some(_) => making.job.made_of.clone(),
         None if making.job.update => up_to_date::made_of(making.job, making.batch, making.shot, making.loaded),
         None => None,
@@ -303,21 +303,21 @@ pub(super) fn metadata(making: &Making, counted: Option<&Counted>) -> Metadata {
     }
 }
 
-/// What `--again` found out.
+/// Settings of a picture to repeat.
 pub(super) struct Repeat {
-    /// The command line that repeats the picture.
+    /// Command line that repeats the picture.
     pub args: RenderArgs,
-    /// The hash its inputs must have.
+    /// Hash that the inputs must have.
     pub hash: String,
-    /// What it was made of, if it says so.
+    /// Hashes of what the picture was made of, as JSON, if stored.
     pub made_of: Option<String>,
-    /// Said when another version of meshray wrote it.
+    /// Warning if another version of meshray wrote the picture.
     pub warning: Option<Diagnostic>,
 }
 
-/// The command line that made `picture`, with what `typed` adds: inputs, output, and how to run.
+/// Command line that made `picture`, completed by `typed`: inputs, output, and how to run.
 ///
-/// The error says how the command ends.
+/// An error comes with the exit code of the command.
 pub(super) fn repeat(picture: &Path, typed: &RenderArgs) -> Result<Repeat, (Box<Diagnostic>, Exit)> {
     let refuse = |text: String, exit| (Box::new(Diagnostic::new("again", picture, "", text)), exit);
     let metadata = read_metadata(picture).map_err(|error| match error {
@@ -363,8 +363,7 @@ fn repeat_from(metadata: Option<Metadata>, picture: &Path, typed: &RenderArgs) -
     Ok(Repeat { args: with_typed(args, inputs, typed), hash, made_of, warning })
 }
 
-/// Where an input is that a picture names: where it was named from, or beside the picture, for which the hash will tell
-/// whether it is the same.
+/// Path of an input named by a picture: as named, or beside the picture. The hash will show whether it is the same.
 fn found(input: &str, picture: &Path) -> PathBuf {
     let (named, folder) = (PathBuf::from(input), picture.parent().unwrap_or(Path::new("")));
     if input == "-" || archives::is_there(&named) {
@@ -386,7 +385,7 @@ fn parse_settings(settings: &Map<String, Value>) -> Result<RenderArgs, String> {
             _ => return Err(format!("carries a setting '{flag}' that makes no sense")),
         }
     }
-    // The real inputs follow; the parser only wants one to be there.
+    // A placeholder for the real inputs, since the parser requires one.
     words.push("input".into());
     match Cli::try_parse_from(words).map(|cli| cli.command) {
         Ok(Command::Render(args)) => Ok(*args),
@@ -395,8 +394,8 @@ fn parse_settings(settings: &Map<String, Value>) -> Result<RenderArgs, String> {
     }
 }
 
-/// Pixels from the picture, everything else as typed now. Where the typed name is of another type, what only the
-/// picture's own can hold is left out.
+/// Combines settings that shape pixels from the picture with everything else as typed. If the typed output name has another file
+/// type, settings specific to the picture's own type are dropped.
 fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> RenderArgs {
     let named = typed.output.as_deref().and_then(|name| FileKind::from_path(Path::new(name)).ok());
     let kind = named.or(pixels.format.map(FileKind::from));
@@ -430,8 +429,7 @@ fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> R
     }
 }
 
-/// Refuses inputs that are not those of the picture. One hash stands for all files that were read, so it cannot be said
-/// which of them has changed.
+/// Refuses inputs that differ from those of the picture. One hash covers all files read, so the changed one is not known.
 pub(super) fn check_hash(expected: &str, loaded: &Loaded, inputs: &[PathBuf], look: &Look) -> Result<(), Diagnostic> {
     let found = hash(loaded.facts.hash);
     if found == expected {
@@ -443,7 +441,7 @@ pub(super) fn check_hash(expected: &str, loaded: &Loaded, inputs: &[PathBuf], lo
     Err(Diagnostic::new("again-hash", &inputs[0], "", text).remedy(remedy))
 }
 
-/// Everything that a hash of inputs stands for, in words.
+/// Files covered by the hash of the inputs, in words.
 fn what_was_read(inputs: &[PathBuf], look: &Look) -> String {
     let model = if inputs.len() > 1 { "one of the models" } else { "the model" };
     match &look.env {
@@ -468,8 +466,8 @@ mod tests {
 
     #[test]
     fn every_flag_that_shapes_pixels_is_stored_and_cannot_be_typed_beside_again() {
-        // Where files may lie, what may be taken and how it ends, a name for settings that are stored one by one, and how what
-        // is shown several times is stored.
+        // Folders and limits, treatment of warnings, a shorthand for settings that are stored one by one, and the storage of
+        // instances.
         const EXEMPT: [&str; 5] = ["root", "max-memory", "strict", "quality", "instances"];
         const SHAPING: [&str; 6] = ["Loading", "Animation", "Camera", "Light and background", "Quality", "Structure"];
         let command = Cli::command();

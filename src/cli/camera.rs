@@ -1,4 +1,4 @@
-//! From what the user chose to a camera in the scene.
+//! Turns the user's choice of camera into a camera in the scene.
 
 use super::args::EyeArgs;
 use super::job::{UsageError, usage_error};
@@ -10,28 +10,28 @@ use crate::scene::framing::{self, Bounds, DEFAULT_FOV, Direction, FrameLens, Nam
 use crate::scene::{Camera, Projection, Scene, UpAxis};
 use std::path::Path;
 
-/// Where a picture is seen from, as chosen.
+/// Chosen viewpoint of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Choice {
-    /// The first camera of a scene file, or else a good side.
+    /// The first camera of a scene file, or else a suitable side of the model.
     Default,
     /// A side of the model.
     Named(NamedView),
     /// A camera of the file, by name or number from 0.
     Camera(String),
-    /// A place of the user's.
+    /// A camera position given by the user.
     Free {
         /// Camera position.
         eye: DVec3,
-        /// What it looks at; `None`: the middle of the model.
+        /// Point to look at; `None`: the middle of the model.
         at: Option<DVec3>,
-        /// Up in the picture; `None`: the scene's up axis.
+        /// Up direction in the picture; `None`: the scene's up axis.
         up: Option<DVec3>,
     },
 }
 
 impl Choice {
-    /// What was typed for a single picture; `up` belongs to the place of an eye.
+    /// Viewpoint typed for a single picture; `up` applies to a camera position.
     pub(super) fn of(args: &EyeArgs, up: Option<[f64; 3]>) -> Result<Self, UsageError> {
         if let Some(eye) = args.eye {
             check_eye(args.eye, args.at)?;
@@ -41,7 +41,7 @@ impl Choice {
         Ok(args.view.map(Self::Named).or(camera).unwrap_or(Self::Default))
     }
 
-    /// The word for it in file names and messages.
+    /// Name of the choice in file names and messages.
     pub(super) fn name(&self) -> String {
         match self {
             Self::Default => "default".into(),
@@ -52,17 +52,17 @@ impl Choice {
     }
 }
 
-/// `--fov` or `--ortho`.
+/// Lens chosen by `--fov` or `--ortho`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum LensChoice {
-    /// Vertical field of view, radians.
+    /// Perspective with a vertical field of view, in radians.
     Fov(f64),
-    /// Parallel rays over a height, or over what the model needs.
+    /// Orthographic over a height in world units; `None`: as high as the model needs.
     Ortho(Option<f64>),
 }
 
 impl LensChoice {
-    /// From what was typed: degrees, a height.
+    /// Lens from the typed degrees or height.
     pub(super) fn new(fov: Option<f64>, ortho: Option<Ortho>) -> Option<Self> {
         match ortho {
             Some(Ortho::Auto) => Some(Self::Ortho(None)),
@@ -78,8 +78,8 @@ impl LensChoice {
         }
     }
 
-    /// The lens itself; `radius` is that of a ball around the model, all of which parallel rays see unless they are given a
-    /// height.
+    /// Projection of the lens. `radius` is that of a bounding sphere of the model, which an orthographic lens without a height
+    /// shows in full.
     fn projection(self, aspect: f64, radius: f64) -> Projection {
         match self {
             Self::Fov(y_fov) => Projection::Perspective { y_fov, aspect: None },
@@ -91,7 +91,7 @@ impl LensChoice {
     }
 }
 
-/// The camera of a choice, and a phrase that says which it is. `aspect` is width / height of the picture.
+/// Camera of a choice, and a phrase that describes it. `aspect` is width / height of the picture.
 pub(super) fn camera(
     choice: &Choice,
     lens: Option<LensChoice>,
@@ -105,7 +105,7 @@ pub(super) fn camera(
     Shown { choice, lens, aspect, file }.camera(scene, bounds, framed)
 }
 
-/// From where to frame the model and with which lens; `None`: the choice says where its camera stands.
+/// Direction and lens to frame the model with; `None` if the choice itself fixes the camera position.
 pub(super) fn framing(
     choice: &Choice,
     lens: Option<LensChoice>,
@@ -120,7 +120,7 @@ pub(super) fn framing(
     Some((direction, framing_lens(lens)))
 }
 
-/// Whether all of the model is brought into the picture.
+/// Whether the camera is placed so that the picture shows the whole model.
 pub(super) fn is_framed(choice: &Choice, scene: &Scene) -> bool {
     match choice {
         Choice::Default => scene.hints.camera.is_none(),
@@ -129,7 +129,7 @@ pub(super) fn is_framed(choice: &Choice, scene: &Scene) -> bool {
     }
 }
 
-/// What is known of a picture's camera before the scene is looked at.
+/// Camera settings of a picture that are known without the scene.
 pub(super) struct Shown<'a> {
     pub choice: &'a Choice,
     pub lens: Option<LensChoice>,
@@ -139,7 +139,7 @@ pub(super) struct Shown<'a> {
 }
 
 impl Shown<'_> {
-    /// The camera, and a phrase that says which it is. `framed` is that of a choice with a [`framing`].
+    /// Camera, and a phrase that describes it. `framed` is the framed camera if the choice has a [`framing`].
     pub(super) fn camera(
         &self,
         scene: &Scene,
@@ -173,7 +173,7 @@ impl Shown<'_> {
                 (Camera { name: String::new(), projection, world_from_camera }, "given eye".to_owned())
             }
         };
-        // Framed cameras have the chosen lens already, but for a height of the user's own.
+        // Framed cameras already have the chosen lens, except for a height given by the user.
         match lens {
             Some(LensChoice::Ortho(None)) | Some(LensChoice::Fov(_)) if is_framed => {}
             Some(lens) => camera.projection = lens.projection(aspect, radius),
@@ -183,7 +183,7 @@ impl Shown<'_> {
     }
 }
 
-/// Refuses an eye that looks at itself.
+/// Refuses a camera position that equals the point it looks at.
 pub(super) fn check_eye(eye: Option<[f64; 3]>, at: Option<[f64; 3]>) -> Result<(), UsageError> {
     if eye.is_some() && eye == at {
         return usage_error("--eye and --at are one point, so the camera looks nowhere; move one");
@@ -191,7 +191,7 @@ pub(super) fn check_eye(eye: Option<[f64; 3]>, at: Option<[f64; 3]>) -> Result<(
     Ok(())
 }
 
-/// Says that the file brings cameras, because nothing in the picture does.
+/// Phrase for the default view, which mentions the file's cameras since the picture does not show them.
 fn default_phrase(scene: &Scene) -> String {
     match scene.cameras.as_slice() {
         [] => "default view".into(),
@@ -212,7 +212,7 @@ fn quoted(name: &str) -> String {
     if name.is_empty() { String::new() } else { format!("'{name}'") }
 }
 
-/// Cameras that are chosen by name or number.
+/// Cameras chosen by name or number.
 const CAMERA: Kind = Kind {
     word: "camera",
     list: "",

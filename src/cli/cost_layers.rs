@@ -1,4 +1,4 @@
-//! `--layers NAMES` and `--heatmap`: what each pixel of a picture cost, inside an EXR or as a picture of its own.
+//! `--layers NAMES` and `--heatmap`: cost of each pixel, as channels of an EXR or as a separate picture.
 
 use super::interrupt;
 use super::job::{RenderJob, Shot};
@@ -12,18 +12,18 @@ use crate::number::{short, so_many, whole};
 use crate::render::{Cost, Costs, Settings};
 use std::path::Path;
 
-/// Every cost that a picture is asked for.
+/// All costs that the job needs, for channels or heat maps.
 pub(super) fn wanted(job: &RenderJob) -> Vec<Cost> {
     let asked = |cost: &Cost| job.look.costs.contains(cost) || job.heatmaps.contains(cost);
     Cost::ALL.into_iter().filter(asked).collect()
 }
 
-/// Puts the channels that were asked for beside the other layers.
+/// Adds the requested cost channels to the other layers.
 pub(super) fn add_channels(job: &RenderJob, costs: &Costs, layers: &mut Layers) {
     layers.channels.extend(job.look.costs.iter().flat_map(|&cost| costs.channels(cost).cloned()));
 }
 
-/// Draws and writes the heat maps of a picture, and says what is in them.
+/// Draws and writes the heat maps of a picture, and reports their contents.
 pub(super) fn write_maps(
     job: &RenderJob,
     shot: &Shot,
@@ -45,7 +45,7 @@ pub(super) fn write_maps(
             Cost::Ms => ("milliseconds", 1e-3, trimmed),
         };
         let scale = Scale::new(job.heatmap_max.unwrap_or(most), unit);
-        // Other rays than the picture's, whose number is not the same everywhere.
+        // These rays are not the picture's, whose number differs between pixels.
         let rays = so_many(u64::from(settings.samples.max(1)), "ray");
         let text = format!("{what} per pixel of {rays}, {accel}: mean {}, most {}", short(mean), label(most));
         let map = Map { width: settings.width, values: &values, scale, title: &text, label };
@@ -57,7 +57,7 @@ pub(super) fn write_maps(
     Ok(())
 }
 
-/// Without zeros at the end: 0.1, not 0.10.
+/// Formats milliseconds without trailing zeros: 0.1, not 0.10.
 fn trimmed(ms: f64) -> String {
     let text = short(ms);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }

@@ -1,12 +1,12 @@
-//! `--dry-run`: what a picture would take, without rendering it.
+//! `--dry-run`: forecasts what a picture would take, without rendering it.
 //!
 //! # Schema `meshray-forecast/1`
-//! With `--stats json` one JSON object for each picture, a line each: `version`, `file`, `output` (`-`: standard
-//! output), `view` (in words), `width`, `height`, `looked_at` (pixels that were rendered to find out), `cpu_seconds`,
-//! `wall_seconds` (if nothing else runs on the processors), `rays` (from the eye), `tests` (ray/prim) and `rmse` (in
-//! the numbers of `--error-space`, of its noise: what two renderings differ by; null where every rendering is the same),
-//! each with `value`, `low` and `high`, which hold it with 95 % confidence (`high` is null where nobody knows, as only one
-//! part of the picture was looked at); `memory` (bytes; null where the system does not tell). Keys are only ever added.
+//! With `--stats json`, one JSON object per picture, each on its own line: `version`, `file`, `output` (`-`: standard output),
+//! `view` (in words), `width`, `height`, `looked_at` (number of pixels rendered for the forecast), `cpu_seconds`, `wall_seconds`
+//! (if nothing else runs on the processors), `rays` (primary), `tests` (ray/prim) and `rmse` (of noise, the difference of two
+//! renderings, in the space of `--error-space`; null where every rendering is the same), each with `value` and a 95 % confidence
+//! interval `low` to `high` (`high` is null if unknown, since only one part of the picture was rendered); `memory` (bytes; null
+//! where the system does not report it). Keys are only ever added.
 
 use super::args::StatsFormat;
 use super::outputs::Target;
@@ -17,7 +17,7 @@ use crate::threads;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Which picture: of what, seen how, written where.
+/// Identity of a picture: input, view and output.
 #[derive(Clone, Copy)]
 pub(super) struct Which<'a> {
     pub file: &'a Path,
@@ -25,7 +25,7 @@ pub(super) struct Which<'a> {
     pub target: &'a Target,
 }
 
-/// What was foretold of one picture, which by itself takes so many bytes of memory.
+/// Formats the forecast of one picture, which itself takes `picture` bytes of memory.
 pub(super) fn told(which: Which, work: &Job, forecast: &Forecast, picture: u64, format: Option<StatsFormat>) -> String {
     let told = Told { which, work, forecast, memory: peak_memory().map(|held| held + picture) };
     if format == Some(StatsFormat::Json) { told.json() } else { told.text() }
@@ -35,12 +35,12 @@ struct Told<'a> {
     which: Which<'a>,
     work: &'a Job<'a>,
     forecast: &'a Forecast,
-    /// The most that the whole run holds at once: what it has held so far, and the picture.
+    /// Peak memory of the whole run: the peak so far, plus the picture.
     memory: Option<u64>,
 }
 
 impl Told<'_> {
-    /// By all threads, where nothing else runs on the processors.
+    /// Wall-clock time of all threads, if nothing else runs on the processors.
     fn wall(&self) -> Interval {
         let side_by_side = rayon::current_num_threads().min(threads::available()).max(1) as f64;
         let Interval { value, low, high } = self.forecast.cpu;

@@ -1,4 +1,4 @@
-//! Pictures that show nothing, or next to nothing: they are written as they are, but not without a word.
+//! Warnings about pictures that show nothing, or next to nothing; they are written all the same.
 
 use super::camera::{self, Choice, LensChoice};
 use crate::accel::{AccelChoice, AccelKind, AccelParams};
@@ -7,11 +7,10 @@ use crate::render::{Coverage, Job, coverage};
 use crate::scene::Scene;
 use std::path::Path;
 
-/// Of a picture that is framed on the model one ray in so many hits it, or its parts are too small to be seen.
+/// A picture framed on the model counts as nearly empty if fewer than one ray in this many hits.
 const FEW: usize = 10_000;
 
-/// What is to be said of a picture by such a choice of the eye, which is called so; nothing of those that show
-/// something.
+/// Warning about the picture of a camera choice, whose name in messages is `view`; `None` if it shows something.
 pub(super) fn warning(
     job: &Job,
     (choice, view): (&Choice, &str),
@@ -25,12 +24,12 @@ pub(super) fn warning(
     Some(Diagnostic { text: format!("{view}: {}", warning.text), ..warning })
 }
 
-/// Whether anything is to be seen in a picture.
+/// Whether anything is visible in a picture.
 pub(super) fn shows_something(job: &Job) -> bool {
     !job.world.is_empty() && looked_through(job).shown
 }
 
-/// How much of a picture shows something, whatever structure it has: all find the same hits, and slow ones would take long.
+/// Coverage of a picture. Slow structures are replaced by the default one, which finds the same hits.
 fn looked_through(job: &Job) -> Coverage {
     if !job.accel.kind().is_slow() {
         return coverage(job);
@@ -39,7 +38,7 @@ fn looked_through(job: &Job) -> Coverage {
     coverage(&Job { accel: &accel, ..*job })
 }
 
-/// What is to be said of a sequence of which no picture shows anything.
+/// Warning about a sequence none of whose pictures shows anything.
 pub(super) fn sequence(pictures: usize, file: &Path) -> Diagnostic {
     let text = match pictures {
         1 => "the picture of this sequence shows nothing".into(),

@@ -1,10 +1,10 @@
-//! Exit codes. They tell a script whether trying again can help.
+//! Exit codes, which tell a script whether a retry can help.
 
 use crate::load::diagnostic::{OVER_MEMORY, RAISE_MEMORY};
 use crate::load::{Diagnostic, LoadError};
 use std::process::ExitCode;
 
-/// How a command ended, from best to worst.
+/// Outcome of a command, from best to worst.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Exit {
     /// 0: done.
@@ -21,7 +21,7 @@ pub enum Exit {
 }
 
 impl Exit {
-    /// The number the system sees.
+    /// Exit code for the system.
     pub fn code(self) -> u8 {
         match self {
             Self::Done => 0,
@@ -39,12 +39,11 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// A model that cannot be loaded: trying again helps with more memory where that was all that was missing, and with another root
-/// folder where there was none.
+/// Exit of a model that cannot be loaded. A retry can help if all faults are about memory or a missing root folder.
 impl From<&LoadError> for Exit {
     fn from(error: &LoadError) -> Self {
         let is_not_of_the_file = |fault: &Diagnostic| match fault.code {
-            // Other files are too large whatever the memory.
+            // The fault is also raised for files that are too large whatever the memory.
             "file-too-large" => fault.remedy == RAISE_MEMORY,
             code => code == OVER_MEMORY || code == "root-missing",
         };

@@ -1,4 +1,4 @@
-//! `meshray explain`: why a mesh costs what it costs, and what would help.
+//! `meshray explain`: why a mesh costs what it does, and what would help.
 //!
 //! # Schema `meshray-explain/1`
 //! One JSON object: `version`, `file`, `hash`, `view`, `width`, `height`, `accel`, `prims` (N); `usual` by ray class
@@ -20,7 +20,7 @@ use crate::render::{CLASS_NAMES, Settings};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
-/// Loads the model, tries every cause and prints what was found.
+/// Loads the model, tries every suspected cause and prints the findings.
 pub(super) fn run(args: &ExplainArgs) -> Exit {
     let messages = Messages::new(args.model.messages.into(), args.quiet);
     let params = match job::params(&args.params, args.accel.kinds()) {
@@ -31,7 +31,7 @@ pub(super) fn run(args: &ExplainArgs) -> Exit {
     panics::guard(&name, &messages, || judge(args, params, &name, &messages).unwrap_or_else(|exit| exit))
 }
 
-/// What is printed.
+/// Contents of the report.
 struct Told<'a> {
     name: &'a str,
     hash: u128,

@@ -1,4 +1,4 @@
-//! Folders among the inputs, and archives with several models: all models in them, and where in them each lies.
+//! Expands folders and archives among the inputs into their models, and finds each model's path below its folder.
 
 use super::exit::Exit;
 use super::message::Severity;
@@ -9,10 +9,13 @@ use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
-/// The inputs, with all models in a folder, and in those in it, in its place, in the order of their names, each once. What is
-/// hidden is left out, and links to folders are not followed. Scene files are no models: they are rendered where they are named.
-/// A zip archive with one model stands for that, and one with several is a folder, as are folders in it. In a folder one is left
-/// out that was unpacked there: beside a folder or a model of its name.
+/// Replaces each folder among the inputs by all models in it and its subfolders, sorted by name, each once. Hidden entries are
+/// skipped, and links to folders are not followed. Scene files do not count as models: they are rendered only where named. A zip
+/// archive with one model stands for that model; one with several is treated as a folder, as are folders in it. In folders,
+/// archives are skipped if they were unpacked in place: a folder or model of the same name is beside them.
+///
+/// Calls `tell` for folders without a model, for those that cannot be read, and for skipped archives; also returns the exit code
+/// that results.
 ///
 /// `tell` hears of folders without a model, of those that cannot be read, and of what is left out; how the command ends because
 /// of these, too.
@@ -41,42 +44,42 @@ pub(super) fn unfold(inputs: &[PathBuf], mut tell: impl FnMut(Severity, &Diagnos
     (models, ended)
 }
 
-/// The folders among the inputs, and the archives, and folders in these.
+/// Folders, archives, and folders in archives among the inputs.
 pub(super) fn of(inputs: &[PathBuf]) -> Vec<PathBuf> {
     let holds = |input: &&PathBuf| is_folder(input) || is_archive(input) || is_folder_in_archive(input);
     inputs.iter().filter(holds).cloned().collect()
 }
 
-/// Whether it is a folder, whatever lies there under the name of standard input.
+/// Whether the input is a folder; `-` never is, even if a folder of that name exists.
 fn is_folder(input: &Path) -> bool {
     input != Path::new("-") && input.is_dir()
 }
 
-/// Whether it is a file with the name of an archive.
+/// Whether the input is a file named like an archive.
 fn is_archive(input: &Path) -> bool {
     is_called_an_archive(input) && without_slash(input).is_file()
 }
 
-/// Whether it is a folder in an archive.
+/// Whether the input is a folder in an archive.
 fn is_folder_in_archive(input: &Path) -> bool {
     in_archive(input).is_ok_and(|found| found.is_some_and(|(archive, name)| archive.has_folder(name)))
 }
 
-/// A path that ends in a name.
+/// The path without a trailing slash.
 fn without_slash(path: &Path) -> PathBuf {
     path.components().collect()
 }
 
-/// The way from the first of these folders that an input lies in to the input's own; empty if that is the same. An archive on
-/// that way is a folder with its name but for the extension, and so is one that was named itself.
+/// Path from the first of the folders that contains the input to the input's own folder; empty if they are the same. An archive
+/// on that path, or named itself, counts as a folder with its name minus the extension.
 pub(super) fn way_below(folders: &[PathBuf], input: &Path) -> PathBuf {
     let Some(folder) = folders.iter().find(|folder| input.starts_with(folder)) else { return PathBuf::new() };
     let rest = |path: &Path| path.strip_prefix(folder).map_or_else(|_| PathBuf::new(), Path::to_path_buf);
     let way = match split(input) {
         Some((archive, name)) if archive.starts_with(folder) => {
-            // Of one that was named itself nothing is left but its own name.
+            // If the archive itself was named, `rest` is empty and only its own name is left.
             let way = rest(archive).with_file_name(archive.file_stem().unwrap_or_default());
-            // To join nothing would end it in a slash.
+            // Joining an empty path would append a slash.
             let inside = name.parent().filter(|inside| !inside.as_os_str().is_empty());
             inside.map_or_else(|| way.clone(), |inside| way.join(inside))
         }
@@ -86,7 +89,7 @@ pub(super) fn way_below(folders: &[PathBuf], input: &Path) -> PathBuf {
     if is_below { way } else { PathBuf::new() }
 }
 
-/// What was found in a folder or an archive.
+/// Models found in a folder or an archive.
 #[derive(Default)]
 struct Found {
     models: Vec<PathBuf>,
@@ -95,7 +98,7 @@ struct Found {
 }
 
 impl Found {
-    /// All models in a folder and in those in it, in the order of their names, and what cannot be read.
+    /// Adds all models in a folder and its subfolders, sorted by name, and faults of what cannot be read.
     fn add_folder(&mut self, folder: &Path) {
         let (mut left, mut archives) = (vec![folder.to_path_buf()], Vec::new());
         while let Some(folder) = left.pop() {
@@ -104,7 +107,7 @@ impl Found {
                 self.told.push((Severity::Error, fault, Exit::Failed));
             }
         }
-        // All folders with models, and all models without their extensions.
+        // All folders with models, and all models' paths without extension.
         let known: HashSet<PathBuf> = {
             let ways = self.models.iter().flat_map(|model| model.ancestors().skip(1).take_while(|way| *way != folder));
             ways.map(Path::to_path_buf).chain(self.models.iter().map(|model| model.with_extension(""))).collect()
@@ -124,7 +127,7 @@ impl Found {
         self.models.sort_unstable();
     }
 
-    /// The models in a folder itself, and the folders and the archives in it.
+    /// Adds the models directly in a folder, and collects its subfolders and archives.
     fn look_into(&mut self, folder: &Path, folders: &mut Vec<PathBuf>, archives: &mut Vec<PathBuf>) -> io::Result<()> {
         for entry in fs::read_dir(folder)? {
             let entry = entry?;
@@ -143,7 +146,7 @@ impl Found {
         Ok(())
     }
 
-    /// The models of an archive: one alone under the name of that.
+    /// Adds the models of an archive; a single model goes by the archive's own name.
     fn add_archive(&mut self, path: &Path) {
         match opened(path).and_then(|archive| archive.ok_or(ArchiveFault::None.into())) {
             Ok(archive) if archive.is_one_model() => self.models.push(path.into()),
@@ -161,8 +164,8 @@ impl Found {
         }
     }
 
-    /// The models of an archive with several, or of a folder in one; false of all else, of which is told where it is loaded what
-    /// is wrong with it.
+    /// Adds the models of an archive with several, or of a folder in an archive. Returns false for anything else; its faults are
+    /// reported when it is loaded.
     fn add_several(&mut self, path: &Path) -> bool {
         let path = &without_slash(path);
         let whole = if is_archive(path) { opened(path).ok().flatten() } else { None };
@@ -216,7 +219,7 @@ mod tests {
         assert_eq!(below(".", "./b/x.glb"), Path::new("b"));
         assert_eq!(below("all", "other/b/x.glb"), Path::new(""));
         assert_eq!(below("all", "all/../x/y.glb"), Path::new(""), "named beside the folder");
-        // What lies in an archive, as far as is known of a file of that name.
+        // Paths into archives; a file with such a name suffices.
         let dir = tempfile::tempdir().unwrap();
         fs::create_dir(dir.path().join("all")).unwrap();
         fs::write(dir.path().join("all/pack.zip"), "").unwrap();

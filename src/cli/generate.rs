@@ -1,4 +1,4 @@
-//! `meshray generate`: scenes of any size, for asking how cost grows.
+//! `meshray generate`: scenes of any size, for studying how cost grows.
 
 use super::args::GenerateArgs;
 use super::exit::Exit;
@@ -12,7 +12,7 @@ use crate::save::{glb, obj};
 use crate::scene::Scene;
 use std::path::PathBuf;
 
-/// Makes the scene and writes it.
+/// Generates the scene and writes it.
 pub(super) fn run(args: &GenerateArgs) -> Exit {
     let messages = Messages::new(args.messages.into(), args.quiet);
     let path = match &args.output {

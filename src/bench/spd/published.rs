@@ -3,7 +3,7 @@
 /// Published figures of one scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene {
-    /// Name of the file, without `.nff`.
+    /// File name, without `.nff`.
     pub name: &'static str,
     /// Number of polygons, patches, spheres, cones and cylinders.
     pub objects: u32,

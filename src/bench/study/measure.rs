@@ -32,13 +32,13 @@ pub struct Row {
 /// Error of renderings, in display codes 0..=1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Error {
-    /// Root of the mean squared error of a rendering, the reference's own taken off.
+    /// Root mean square error of a rendering, with the reference's own error subtracted.
     pub rmse: f64,
-    /// What is less than this cannot be told from 0, as the reference is off itself.
+    /// Detection limit: a smaller error cannot be distinguished from 0, because of the reference's own error.
     pub least: f64,
-    /// How far a rendering is off the mean of all: what more samples lessen.
+    /// Deviation of a rendering from the mean of all, which more samples lessen.
     pub noise: f64,
-    /// How far the mean of all is off the reference: what no number of samples lessens.
+    /// Deviation of the mean of all from the reference, which more samples do not lessen.
     pub bias: f64,
     /// Greatest error of a channel of the first rendering.
     pub max: f64,

@@ -10,7 +10,7 @@ use crate::scene::{
 };
 use std::path::Path;
 
-/// A mirror ball before a matt one, in the studio.
+/// A mirror ball beside a matt one, in the studio environment.
 fn balls() -> Scene {
     let metal = MetalRough { metallic: 1.0, roughness: 0.0, ..MetalRough::default() };
     let mirror = Material { reflection: Reflection::MetalRough(metal), ..Material::plain() };
@@ -24,7 +24,7 @@ fn balls() -> Scene {
     }
 }
 
-/// A wall of noise, three texels to a pixel across.
+/// Wall with a noise texture, three texels per pixel along each axis.
 fn noise() -> Scene {
     const SIDE: u32 = 96;
     let code = |i: u32| if i.wrapping_mul(0x9e37_79b9) >> 13 & 1 == 1 { [255; 4] } else { [0, 0, 0, 255] };
@@ -115,7 +115,7 @@ fn more_samples_are_nearer_to_the_reference_and_what_is_the_same_each_time_is_bi
     assert!(off.noise == 0.0 && (off.bias - off.rmse).abs() < 1e-12 && off.max > off.rmse && off.flip > 0.0);
     let random = row(&study, "--pixel-error 0.04").error;
     assert!(random.noise > random.bias && random.rmse < 0.04, "{random:?}");
-    // What is measured is what the flag alone gives.
+    // The measured settings are those that the flag alone gives.
     let most = Quality::default().stochastic().max_samples;
     let rows: Vec<&Row> = study.rows.iter().filter(|row| row.setting.knob == Knob::Stochastic).collect();
     let is_usual =

@@ -1,4 +1,4 @@
-//! Growth, sweeps, choices and differences, as reports tell them.
+//! Reports of growth, sweeps, choices and differences.
 
 use super::{SIZE, Stage, plan};
 use crate::accel::{AccelKind, Count, RayCounts, auto};
@@ -10,7 +10,7 @@ use crate::bench::report::{Format, Model, Report, text};
 use crate::bench::row::Row;
 use crate::number::grouped;
 
-/// Three sizes of a family whose structures cost what laws say, to the digit.
+/// Report of three sizes of a family whose costs follow exact power laws.
 fn grown() -> Report {
     let whole = Stage::new().report(Plan { kinds: vec![AccelKind::None, AccelKind::Bvh], passes: 1, ..plan() });
     let model = |prims: usize| {
@@ -52,12 +52,12 @@ fn every_format_tells_the_exponents_of_growth() {
     assert!(Format::Html.write(&report).contains(">bvh 0.50</text>"));
     let text = text::write_growth(&report);
     assert!(text.lines().any(|l| l.starts_with("10 000  ") && l.contains("fast-octree")), "{text}");
-    // One size is no growth, and no fault.
+    // A single size has no growth, which is no error.
     report.models.truncate(1);
     assert!(text::write_growth(&report).contains("One size only"));
 }
 
-/// The report of a sweep over the small scene.
+/// Report of a sweep over the small scene.
 fn swept(sweep: &str, kinds: &[AccelKind], passes: usize) -> Report {
     Stage::new().report(Plan { kinds: kinds.into(), sweep: Some(sweep.parse().unwrap()), passes, ..plan() })
 }
@@ -104,7 +104,7 @@ fn a_structure_whose_default_has_no_such_value_is_compared_with_it_all_the_same(
     assert_eq!(octree, [(Some(1.0), false), (Some(8.0), false), (None, true)]);
     assert_eq!(settings(AccelKind::Bvh).filter(|s| s.is_default).map(|s| s.value).collect::<Vec<_>>(), [Some(2.0)]);
     let html = Format::Html.write(&report);
-    // One for each cost: tests, visits, time, memory, build.
+    // One per cost: tests, visits, time, memory, build.
     assert_eq!(html.matches("k-octree level").count(), 5);
     assert_eq!(html.matches("<circle class=\"k-bvh around\"").count(), 5);
 }
@@ -113,7 +113,7 @@ fn a_structure_whose_default_has_no_such_value_is_compared_with_it_all_the_same(
 fn what_auto_would_choose_is_held_against_the_rays() {
     let kinds = vec![AccelKind::FastOctree, AccelKind::FastBvh];
     let mut report = Stage::new().report(Plan { kinds, ..plan() });
-    // In so small a scene both are one leaf; the second is to cost more.
+    // In so small a scene both are a single leaf; make the second cost more.
     report.models[0].rows[1].classes.iter_mut().for_each(|c| c.counts.n_ts += c.counts.queries);
     let nodes = |row: &Row| {
         let mut sum = RayCounts::default();
@@ -173,7 +173,7 @@ fn times_that_overlap_or_come_from_one_pass_are_said_to_be_doubtful() {
         let kinds = vec![AccelKind::FastOctree, AccelKind::FastBvh];
         let mut report = Stage::new().report(Plan { kinds, ..plan() });
         report.plan.passes = times[0].len();
-        // In so small a scene both are one leaf.
+        // In so small a scene both are a single leaf; make their sizes differ.
         report.models[0].rows[1].made_of.n_in += 1;
         for (row, times) in report.models[0].rows.iter_mut().zip(times) {
             row.classes.iter_mut().for_each(|c| times.iter().for_each(|&t| c.seconds.push(t)));
@@ -217,7 +217,7 @@ fn an_average_ray_is_one_of_the_mixture_that_the_picture_asks_however_many_are_k
     let tests: u64 = all.models[0].rows[0].classes.iter().map(|c| c.counts.n_it).sum();
     let mean = |report: &Report| report.models[0].per_ray(&report.models[0].rows[0], Count::It);
     assert!((mean(&all) - tests as f64 / all.models[0].rows[0].rays() as f64).abs() < 1e-9);
-    // Of each class as many as of the smallest, which costs another number of tests than the others.
+    // Keep equally many rays of each class, although their costs differ.
     let mut few = all.clone();
     let (model, least) = (&mut few.models[0], all.models[0].rays.iter().map(|rays| rays.kept).min().unwrap());
     for (rays, class) in model.rays.iter_mut().zip(&mut model.rows[0].classes) {

@@ -1,4 +1,4 @@
-//! Speed against error of ray/triangle tests: one plot of ours, and of others' where there are any.
+//! Speed against error of ray/triangle tests: plots our tests, and those of other programs if given.
 
 use super::Findings;
 use super::tally::{Rate, Tally};
@@ -8,26 +8,26 @@ use crate::bench::report::html::{escaped, page, paragraph};
 use crate::number::{grouped, short};
 use std::fmt::Write;
 
-/// One way to find hits, measured.
+/// Measured speed and error of one way to find hits.
 #[derive(Clone, Debug)]
 pub struct Kernel {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Whether it is one of this program's.
+    /// Whether the kernel is one of this program's.
     pub is_ours: bool,
-    /// Seconds of one thread for a ray.
+    /// Seconds per ray on one thread.
     pub seconds_per_ray: f64,
-    /// Its answers, judged by exact arithmetic.
+    /// Answers as judged by exact arithmetic.
     pub tally: Tally,
 }
 
 impl Kernel {
-    /// Millions of rays a second.
+    /// Millions of rays per second.
     pub fn rate(&self) -> f64 {
         1e-6 / self.seconds_per_ray
     }
 
-    /// Wrong answers in 10⁹ rays; where none was seen, what they are fewer than, at 95 % confidence.
+    /// Wrong answers per 10⁹ rays; if none was seen, their upper bound at 95 % confidence.
     pub fn wrong_in_a_billion(&self) -> Rate {
         match Rate::new(self.tally.wrong(), self.tally.rays) {
             Rate::Seen(million) => Rate::Seen(million * 1e3),
@@ -36,7 +36,7 @@ impl Kernel {
     }
 }
 
-/// Those of a mesh that was judged: the tests through the default structure, over all places and sizes.
+/// Kernels of a verified mesh: each test through the default structure, over all variations.
 pub fn of(findings: &Findings) -> Vec<Kernel> {
     let kernel = |cost: &super::TestTime| Kernel {
         name: cost.test.name().to_owned(),
@@ -47,7 +47,7 @@ pub fn of(findings: &Findings) -> Vec<Kernel> {
     findings.costs.iter().map(kernel).collect()
 }
 
-/// A page for a browser with the plot and its numbers.
+/// HTML page with the plot and its numbers.
 pub fn html(name: &str, rays: &str, kernels: &[Kernel]) -> String {
     let mut out = format!("<section><h2>{}</h2>\n", escaped(name));
     out += &paragraph(rays);
@@ -62,7 +62,7 @@ pub fn html(name: &str, rays: &str, kernels: &[Kernel]) -> String {
     page("Speed against error of ray/triangle tests", &out)
 }
 
-/// Of a rate: its number, and whether it was seen.
+/// Value of a rate, and whether it was seen rather than a bound.
 fn number(rate: Rate) -> (f64, bool) {
     match rate {
         Rate::Seen(x) => (x, true),
@@ -72,7 +72,7 @@ fn number(rate: Rate) -> (f64, bool) {
 
 fn plot(kernels: &[Kernel]) -> String {
     const LEFT: f64 = 52.0;
-    // As far as leaves room for the longest name.
+    // Leaves room for the longest name.
     const RIGHT: f64 = 272.0;
     const TOP: f64 = 14.0;
     const BOTTOM: f64 = 270.0;
@@ -98,7 +98,7 @@ fn plot(kernels: &[Kernel]) -> String {
         rule(&mut svg, [px, place], [RIGHT + 6.0, label], "");
         words(&mut svg, RIGHT + 8.0, label + 4.0, "start", "", &escaped(&kernel.name));
         let class = if kernel.is_ours { "reflected" } else { "diffuse" };
-        // A disc; or a bar with an arrow that points to where the truth may lie.
+        // A disc for seen rates, a bar with a down arrow for upper bounds.
         let shape = if seen {
             "M-4.5 0a4.5 4.5 0 1 0 9 0a4.5 4.5 0 1 0-9 0z"
         } else {

@@ -1,8 +1,8 @@
-//! How far a mesh's hits can be trusted: every ray/triangle test through every structure, judged by exact arithmetic.
+//! Verifies how far a mesh's hits can be trusted: every ray/triangle test through every structure, judged by exact arithmetic.
 //!
-//! The mesh is taken as it is, scaled, and moved far from the origin in two ways ([`variation`]). For each, rays are
-//! aimed at what is hard ([`aim`](crate::bench::aim)), the oracle says what they hit
-//! ([`oracle`](crate::bench::oracle)), and answers are counted against that ([`tally`]).
+//! The mesh is taken unchanged, scaled, and moved far from the origin in two ways ([`variation`]). For each variation, rays are
+//! aimed at hard targets ([`aim`](crate::bench::aim)), the oracle computes the exact hits ([`oracle`](crate::bench::oracle)), and
+//! the answers are tallied against them ([`tally`]).
 
 pub mod kernels;
 pub mod spawned;
@@ -20,94 +20,94 @@ use super::oracle::{Oracle, Truth};
 use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, IntersectorKind, NoProbe, Ray};
 use crate::scene::Scene;
 
-/// What is to be done.
+/// Settings of a verification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
-    /// Rays of each [`Aim`] for each variation, at least 1; fewer where rounding made much of the mesh collapse.
+    /// Rays per [`Aim`] and variation, at least 1; fewer where rounding collapsed much of the mesh.
     pub rays: usize,
-    /// Changes the rays.
+    /// Seed of the rays.
     pub seed: u64,
-    /// Ray/triangle tests that structures without culling may take for each row; they get as few rays as that allows.
+    /// Ray/triangle tests per row that structures without culling may take; their number of rays follows from that.
     pub brute_tests: usize,
 }
 
 impl Plan {
-    /// Some seconds for a mesh of a hundred thousand triangles.
+    /// Takes some seconds for a mesh of a hundred thousand triangles.
     pub const DEFAULT: Self = Self { rays: 2000, seed: 0, brute_tests: 10_000_000 };
 }
 
-/// One intersector through one structure over one variation.
+/// Results of one intersector through one structure over one variation.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// The test of triangles.
+    /// Ray/triangle test.
     pub test: IntersectorKind,
-    /// The structure.
+    /// Structure.
     pub accel: AccelKind,
-    /// What came out for each [`Aim`], in their order.
+    /// Results per [`Aim`], in the order of [`Aim::ALL`].
     pub tallies: Vec<Tally>,
 }
 
 impl Row {
-    /// All aims together.
+    /// Sum over all aims.
     pub fn total(&self) -> Tally {
         self.tallies.iter().fold(Tally::default(), |sum, t| sum + *t)
     }
 }
 
-/// All rows of one variation.
+/// Results of one variation.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// What was done to the mesh.
+    /// Transformation of the mesh.
     pub variation: &'static str,
-    /// How far, or how much.
+    /// Amount of the transformation.
     pub amount: f64,
-    /// Whether the frame is centred, as the scenes that are rendered are.
+    /// Whether the frame is centred, as that of rendered scenes is.
     pub centred: bool,
-    /// Triangles that rounding left without three different corners, though they had some.
+    /// Triangles whose three different corners rounding made coincide.
     pub collapsed: usize,
-    /// Rows by intersector, then structure.
+    /// Rows by intersector, then by structure.
     pub rows: Vec<Row>,
-    /// Rays of the exact test about which two structures gave different bits.
+    /// Rays of the exact test for which two structures gave different bits.
     pub disagreements: usize,
-    /// Secondary rays of the exact test.
+    /// Results of secondary rays with the exact test.
     pub spawned: Spawned,
 }
 
-/// How long a test takes.
+/// Measured time of a ray/triangle test.
 #[derive(Clone, Debug)]
 pub struct TestTime {
-    /// The test of triangles.
+    /// Ray/triangle test.
     pub test: IntersectorKind,
-    /// Seconds of one ray in the default structure on one thread, of [`PASSES`] passes over the rays of the unchanged mesh.
+    /// Seconds per ray in the default structure on one thread, from [`PASSES`] passes over the rays of the unchanged mesh.
     pub per_ray: Spread,
 }
 
-/// Everything that was found.
+/// Results of a verification.
 #[derive(Clone, Debug)]
 pub struct Findings {
-    /// Triangles of the mesh; other prims are not judged.
+    /// Number of triangles of the mesh; other prims are not verified.
     pub triangles: usize,
-    /// Spheres, cones, polygons and planes, which were left out.
+    /// Number of spheres, cones, polygons and planes, which are left out.
     pub others: usize,
-    /// One for each variation, the unchanged mesh first.
+    /// One section per variation, the unchanged mesh first.
     pub sections: Vec<Section>,
-    /// One for each intersector.
+    /// Times of each intersector.
     pub costs: Vec<TestTime>,
 }
 
-/// Times each test is measured.
+/// Number of timed passes per test.
 pub const PASSES: usize = 5;
 
 impl Findings {
-    /// All rays of a test through the default structure, over all variations.
+    /// Results of a test through the default structure, over all variations.
     pub fn total(&self, test: IntersectorKind) -> Tally {
         let rows = self.sections.iter().flat_map(|s| &s.rows);
         let rows = rows.filter(|r| r.test == test && r.accel == AccelKind::DEFAULT);
         rows.fold(Tally::default(), |sum, r| sum + r.total())
     }
 
-    /// Whether the default test made no error, in any structure, and no secondary ray started on the wrong side of a
-    /// face. Starts are judged where the frame is centred: elsewhere a mesh may be smaller than their rounding.
+    /// Whether the exact test made no error in any structure, and no secondary ray started on the wrong side of a face. Starts
+    /// count only where the frame is centred: elsewhere a mesh may be smaller than their rounding error.
     pub fn trusted(&self) -> bool {
         self.sections.iter().all(|s| {
             let exact = s.rows.iter().filter(|r| r.test == IntersectorKind::Exact);
@@ -118,7 +118,7 @@ impl Findings {
     }
 }
 
-/// Judges a scene. `done` is told of each variation; `None` when it says to stop, or without triangles.
+/// Verifies a scene. `go_on` is called with variation index and count; `None` when it returns false, or without triangles.
 pub fn verify(scene: &Scene, plan: &Plan, mut go_on: impl FnMut(usize, usize) -> bool) -> Option<Findings> {
     let variations = Variations::new(scene);
     let original = variations.get(0);
@@ -139,7 +139,7 @@ fn section(variation: &Variation, plan: &Plan) -> Option<Section> {
     let shapes = &variation.shapes;
     let mut aimer = Aimer::new(shapes, plan.seed)?;
     let oracle = Oracle::new(shapes);
-    // What is left of a collapsed mesh lies in few places, and every ray there meets thousands of its triangles.
+    // The rest of a collapsed mesh is concentrated in few places, where every ray hits thousands of triangles.
     let left = shapes.triangles.len().saturating_sub(variation.collapsed);
     let count = (plan.rays * left / shapes.triangles.len().max(1)).clamp(plan.rays.min(10), plan.rays);
     let sets: Vec<Vec<Ray>> = Aim::ALL.iter().map(|&aim| aimer.rays(aim, count)).collect();
@@ -174,8 +174,8 @@ fn section(variation: &Variation, plan: &Plan) -> Option<Section> {
     Some(Section { variation: name, amount, centred, collapsed, rows, disagreements, spawned })
 }
 
-/// The exact test is judged through every structure. The others are through the default one and without any: they may
-/// answer differently through each, and there are many.
+/// Whether a test is verified through a structure: the exact test is through all. The others are only through the default one and
+/// without any, since they may answer differently through each of the many.
 fn is_judged(test: IntersectorKind, kind: AccelKind) -> bool {
     test == IntersectorKind::Exact || matches!(kind, AccelKind::DEFAULT | AccelKind::None)
 }
@@ -184,7 +184,7 @@ fn take(rays: &[Ray], count: usize) -> &[Ray] {
     &rays[..rays.len().min(count)]
 }
 
-/// First hits, by all threads.
+/// First hits of rays, traced on all threads.
 fn hits(accel: &AnyAccel, rays: &[Ray]) -> Vec<Hit> {
     let slice = |rays: &[Ray]| {
         let mut hits = vec![Hit::MISS; rays.len()];
@@ -194,7 +194,7 @@ fn hits(accel: &AnyAccel, rays: &[Ray]) -> Vec<Hit> {
     rays.par_chunks(256).flat_map_iter(slice).collect()
 }
 
-/// Times of the tests on the same rays, one thread, pass by pass in turn.
+/// Times of all tests on the same rays on one thread, with interleaved passes.
 fn costs(variation: &Variation, plan: &Plan) -> Option<Vec<TestTime>> {
     let shapes = &variation.shapes;
     let mut aimer = Aimer::new(shapes, plan.seed)?;

@@ -1,8 +1,8 @@
-//! Rays that start on a surface, as shadow rays do: do they hit what they start on, or slip through what is there?
+//! Rays that start on a surface, as shadow rays do: do they hit the surface itself, or slip through their surroundings?
 //!
-//! A start in `f32` lies beside the surface. It is judged in rational numbers: it must lie on the side of its face to which
-//! the ray leaves, and no face that meets its own may stand between it and the place of its face that it stands for. That
-//! is the place of the hit, or where the start keeps away from an edge, the place it keeps to.
+//! A ray origin in `f32` does not lie exactly on the surface. It is judged in rational arithmetic: it must lie on the side of its
+//! face to which the ray leaves, and no adjacent face may stand between it and its reference point on its own face. That is the
+//! hit point or, where the origin is kept away from an edge, the point that replaces it.
 
 use dashu::rational::RBig;
 use rayon::prelude::*;
@@ -17,24 +17,24 @@ use crate::math::random::Random;
 use crate::math::rational::{Exact3, cross, dot, foot, hit, minus, point, sign};
 use crate::math::triangle::{self, Triangle};
 
-/// A start's own error this many times over is beside it.
+/// Radius of the search for adjacent faces, in multiples of the start's own error.
 const BESIDE: f32 = 16.0;
 
-/// Rays that are one thread's work at a time.
+/// Rays per parallel task.
 const SLICE: usize = 256;
 
-/// Counts over spawned rays.
+/// Counts over rays spawned on surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Spawned {
-    /// Rays.
+    /// Number of rays.
     pub rays: usize,
-    /// Rays that are stopped and start on the wrong side of their own face, or of one that shares a corner with it.
+    /// Occluded rays that start on the wrong side of their own face or of one that shares a corner with it.
     pub self_hits: usize,
-    /// Rays that are free and start there.
+    /// Unoccluded rays that start on the wrong side of such a face.
     pub slips: usize,
-    /// Rays that were answered as free though exact arithmetic finds something in their way.
+    /// Rays answered as unoccluded although exact arithmetic finds an occluder.
     pub leaks: usize,
-    /// Rays answered as blocked though exact arithmetic finds nothing in their way.
+    /// Rays answered as occluded although exact arithmetic finds no occluder.
     pub false_shadows: usize,
 }
 
@@ -50,7 +50,7 @@ impl Spawned {
     }
 }
 
-/// One ray from each hit, towards a random side, through the default structure.
+/// Spawns one ray from each hit, in a random direction, and traces it through the default structure.
 pub(super) fn spawned(
     shapes: &Shapes,
     structures: &[AnyAccel],
@@ -62,7 +62,7 @@ pub(super) fn spawned(
         return Spawned::default();
     };
     let slice = |(number, rays): (usize, &[&Ray])| {
-        // One stream for each slice, so that threads do not show.
+        // One random stream per slice, so that results do not depend on the number of threads.
         let mut random = Random::new(seed ^ (number as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let mut scratch = accel.scratch();
         let each = rays.iter().filter_map(|ray| spawn(shapes, accel, oracle, ray, &mut random, &mut scratch));
@@ -100,18 +100,18 @@ fn spawn(
     Some(counts)
 }
 
-/// Where a ray starts, and what that stands for.
+/// Origin of a spawned ray, and the point of its face that it stands for.
 struct Start {
-    /// The face, and its number.
+    /// The face, and its index.
     face: Triangle,
     prim: u32,
-    /// Its normal, of any length.
+    /// Normal of the face, not normalised.
     up: Exact3,
-    /// The exact place of the face, and as far around it as the start may be.
+    /// Exact reference point on the face, and a box in `f32` around it in which adjacent faces are searched.
     place: Exact3,
     middle: Vec3,
     reach: f32,
-    /// From a corner of the face, and from the place.
+    /// Vectors to the origin from a corner of the face, and from the reference point.
     above: Exact3,
     way: Exact3,
     dir: Exact3,
@@ -136,16 +136,16 @@ impl Start {
         })
     }
 
-    /// Whether it lies on the wrong side of its own face, or of one that meets it.
+    /// Whether the origin lies on the wrong side of its own face or of an adjacent one.
     fn is_astray(&self, shapes: &Shapes, oracle: &Oracle) -> bool {
         let [side, height] = [&self.dir, &self.above].map(|v| sign(&dot(&self.up, v)));
         let others = || oracle.near(self.middle, self.reach).filter(|&prim| prim != self.prim);
         side * height != side * side || others().any(|prim| self.is_behind(&shapes.triangle(prim)))
     }
 
-    /// Whether a face that has a corner in common with its own stands between it and its place. Of faces that lie over its own
-    /// at an angle below [`EDGE_FOLD`] none is held against it, nor of those that do not meet it: they may stand closer than
-    /// any start can tell.
+    /// Whether a face that shares a corner with its own stands between the origin and its reference point. Faces folded onto its
+    /// own at an angle below [`EDGE_FOLD`] do not count, nor those that do not touch it: they may be closer than any origin can
+    /// resolve.
     fn is_behind(&self, other: &Triangle) -> bool {
         let between = |t: RBig| t > RBig::ZERO && t <= RBig::ONE;
         self.face.iter().any(|p| other.contains(p))
@@ -153,7 +153,7 @@ impl Start {
             && !self.is_folded(other)
     }
 
-    /// Whether a face lies so over that of the start, or under it.
+    /// Whether a face is folded onto that of the origin, above or below it.
     fn is_folded(&self, other: &Triangle) -> bool {
         let [normal, leaning] = [&self.face, other].map(|t| triangle::normal(t).as_dvec3());
         let narrow = normal.cross(leaning).length() < EDGE_FOLD * normal.dot(leaning).abs();
@@ -168,7 +168,7 @@ mod tests {
     use crate::accel::{AccelKind, AccelParams, BitSet};
     use crate::bench::aim::{Aim, Aimer};
 
-    /// All counts for rays from hits of every aim on a closed mesh.
+    /// Counts for rays from hits of every aim on a mesh.
     fn counts(shapes: Shapes) -> Spawned {
         counts_of(shapes, 400)
     }
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(Spawned { rays: 0, ..counts }, Spawned::default());
     }
 
-    /// A closed box with right angles, corners at (±1, ±1, ±1).
+    /// Closed box with right angles and corners at (±1, ±1, ±1).
     fn room() -> Shapes {
         let corner = |i: u32| Vec3::from([0, 1, 2].map(|k| if i >> k & 1 == 1 { 1.0 } else { -1.0 }));
         let side = |a: u32, b: u32, c: u32, d: u32| [[a, b, c], [a, c, d]];
@@ -204,7 +204,7 @@ mod tests {
         scenes::mesh((0..8).map(corner).collect(), sides.concat())
     }
 
-    /// Leaves of a book, each so far from the next at the outer edge, which is 1 from the spine.
+    /// Leaves of a book, `apart` from each other at the outer edge, at distance 1 from the spine.
     fn book(apart: f32) -> Shapes {
         const LEAVES: u32 = 6;
         #[expect(clippy::cast_precision_loss, reason = "a small number")]
@@ -226,7 +226,7 @@ mod tests {
         }
     }
 
-    /// A pipe along z: at its rims the inside, where faces rise from each other, meets the ends, where they fall away.
+    /// Pipe along z: at its rims the concave inside meets the ends, whose edges are convex.
     fn pipe() -> Shapes {
         const SIDES: u32 = 32;
         #[expect(clippy::cast_precision_loss, reason = "a small number")]
@@ -239,7 +239,7 @@ mod tests {
         let segment = |k: u32| {
             let next = (k + 1) % SIDES;
             let at = |k: u32, i: u32| 4 * k + i;
-            // Inside, outside, below, above.
+            // Inside, outside, bottom, top.
             let walls = [[0, 2], [3, 1], [1, 0], [2, 3]];
             walls.map(|[i, j]| quad([at(k, i), at(k, j), at(next, j), at(next, i)])).concat()
         };

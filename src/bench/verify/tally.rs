@@ -1,37 +1,37 @@
-//! Answers counted against the truth.
+//! Tallies of answers against exact hits.
 
 use std::ops::Add;
 
 use crate::accel::{Hit, Ray};
 use crate::bench::oracle::{Oracle, Truth, ulps};
 
-/// A hit is in the wrong order only when a nearer one is nearer by more than this, in units in the last place: what the
-/// rounding of two distances can hide.
+/// Least difference in distance for a hit to count as behind another, in units in the last place: the rounding of two distances
+/// can hide less.
 const ORDER_ULPS: f64 = 2.0;
 
 /// Counts over a set of rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tally {
-    /// Rays asked.
+    /// Number of rays.
     pub rays: usize,
     /// Rays that hit, by exact arithmetic.
     pub hits: usize,
-    /// Rays that hit but were answered with nothing.
+    /// Rays that hit but were answered with a miss.
     pub missed: usize,
-    /// Answers with a triangle that the ray does not meet in its range.
+    /// Answers with a triangle that the ray does not hit in its range.
     pub false_hits: usize,
-    /// Answers with a triangle behind the nearest.
+    /// Answers with a triangle behind the nearest one.
     pub wrong_order: usize,
-    /// Largest error of t, in units in the last place, over true hits.
+    /// Largest error of t over true hits, in units in the last place.
     pub max_ulps: f64,
-    /// Sum of the squares of the errors of t.
+    /// Sum of the squared errors of t.
     pub sum_squares: f64,
-    /// Answers with true hits: those behind [`Self::sum_squares`].
+    /// Answers with true hits, over which [`Self::sum_squares`] is taken.
     pub measured: usize,
 }
 
 impl Tally {
-    /// Judges answers; there may be fewer of them than rays.
+    /// Judges answers; there may be fewer answers than rays.
     pub fn of(oracle: &Oracle, rays: &[Ray], truths: &[Option<Truth>], answers: &[Hit]) -> Self {
         let each = rays.iter().zip(truths).zip(answers);
         each.fold(Self::default(), |sum, ((ray, truth), hit)| sum + Self::one(oracle, ray, truth.as_ref(), hit))
@@ -55,17 +55,17 @@ impl Tally {
         tally
     }
 
-    /// Whether there is no wrong answer.
+    /// Whether no answer is wrong.
     pub fn is_clean(&self) -> bool {
         (self.missed, self.false_hits, self.wrong_order) == (0, 0, 0)
     }
 
-    /// Wrong answers of any kind.
+    /// Number of wrong answers of any kind.
     pub fn wrong(&self) -> usize {
         self.missed + self.false_hits + self.wrong_order
     }
 
-    /// Root of the mean square of the errors of t, in units in the last place.
+    /// Root mean square error of t, in units in the last place.
     #[expect(clippy::cast_precision_loss, reason = "a mean")]
     pub fn rms_ulps(&self) -> f64 {
         (self.sum_squares / self.measured.max(1) as f64).sqrt()
@@ -89,17 +89,17 @@ impl Add for Tally {
     }
 }
 
-/// A rate per million, with what is known when none was seen: fewer than 3/n, at 95 % confidence.
+/// Rate per million; if no event was seen, the bound 3/n at 95 % confidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rate {
-    /// So many per million.
+    /// Observed rate per million.
     Seen(f64),
-    /// None; fewer than this per million.
+    /// No event seen; upper bound per million.
     Below(f64),
 }
 
 impl Rate {
-    /// `count` in `rays`.
+    /// Rate of `count` events in `rays` rays.
     #[expect(clippy::cast_precision_loss, reason = "a rate")]
     pub fn new(count: usize, rays: usize) -> Self {
         let million = 1e6 / rays.max(1) as f64;

@@ -1,22 +1,22 @@
-//! The mesh as it is, scaled by powers of two, and moved away from the origin in two ways.
+//! Variations of a mesh: unchanged, scaled by powers of two, and moved away from the origin in two ways.
 
 use crate::accel::{BitSet, Shapes};
 use crate::math::{DVec3, Vec3};
 use crate::render::World;
 use crate::scene::Scene;
 
-/// Direction of a move: no axis, and not of unit length.
+/// Direction of a move: along no axis, and not of unit length.
 const AWAY: DVec3 = DVec3::new(1.0, 0.7, 1.3);
 
-/// What is done to the mesh.
+/// Transformation of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Change {
     None,
-    /// By a power of two, which changes no digit of any number.
+    /// Scaled by a power of two, which changes no mantissa.
     Scaled(i32),
-    /// In units of the file, by the transforms, before the scene is centred.
+    /// Moved through the instance transforms before the scene is centred, in units of the file.
     MovedBeforeCentring(f64),
-    /// In units of the file, in the stored vertices.
+    /// Moved by changing the stored vertices, in units of the file.
     MovedInF32(f64),
 }
 
@@ -34,37 +34,37 @@ const CHANGES: [Change; 11] = [
     Change::MovedInF32(1e9),
 ];
 
-/// The mesh after something was done to it.
+/// The mesh after a transformation.
 #[derive(Clone, Debug)]
 pub struct Variation {
-    /// What was done.
+    /// Name of the transformation.
     pub name: &'static str,
-    /// How far, or how much; 0 for nothing.
+    /// Distance of the move or factor of the scaling; 0 for the unchanged mesh.
     pub amount: f64,
-    /// Whether the frame is centred, as the scenes that are rendered are.
+    /// Whether the frame is centred, as that of rendered scenes is.
     pub centred: bool,
-    /// Its triangles alone.
+    /// Triangles of the mesh; other prims are left out.
     pub shapes: Shapes,
-    /// Triangles that rounding left without three different corners, though they had them.
+    /// Triangles whose three different corners rounding made coincide.
     pub collapsed: usize,
-    /// Prims that are no triangles.
+    /// Number of prims that are not triangles.
     pub others: usize,
 }
 
-/// Makes the variations of a scene, one at a time: each is as large as the mesh.
+/// Makes the variations of a scene one at a time, as each takes as much memory as the mesh.
 #[derive(Clone, Debug)]
 pub struct Variations {
-    /// What stands where, without textures and lights.
+    /// Meshes, instances and materials, without textures and lights.
     scene: Scene,
     original: Shapes,
     others: usize,
 }
 
 impl Variations {
-    /// How many there are.
+    /// Number of variations.
     pub const COUNT: usize = CHANGES.len();
 
-    /// Of a scene.
+    /// Prepares the variations of a scene.
     pub fn new(scene: &Scene) -> Self {
         let shapes = World::new(scene).shapes;
         let Scene { meshes, instances, materials, .. } = scene;
@@ -80,7 +80,7 @@ impl Variations {
         }
     }
 
-    /// Variation `i`, less than [`Self::COUNT`]; the first is the unchanged mesh.
+    /// Variation `i`, below [`Self::COUNT`]; the first is the unchanged mesh.
     pub fn get(&self, i: usize) -> Variation {
         let original = &self.original;
         let (name, amount, shapes) = match CHANGES[i] {
@@ -100,7 +100,7 @@ impl Variations {
         Variation { name, amount, centred, shapes, collapsed, others: self.others }
     }
 
-    /// The triangles of the scene somewhere else: transforms are composed in `f64`.
+    /// Triangles of the moved scene; transforms are composed in `f64`.
     fn moved(&self, by: DVec3) -> Shapes {
         let mut scene = self.scene.clone();
         scene.instances.iter_mut().for_each(|i| i.world_from_object.translation += by);
@@ -120,7 +120,7 @@ fn with_vertices(shapes: &Shapes, f: impl Fn(Vec3) -> Vec3) -> Shapes {
     Shapes { vertices: shapes.vertices.iter().map(|&p| f(p)).collect(), ..shapes.clone() }
 }
 
-/// Triangles with three different corners.
+/// Number of triangles with three different corners.
 fn distinct(shapes: &Shapes) -> usize {
     let corners = |t: &[u32; 3]| t.map(|i| shapes.vertices[i as usize]);
     shapes.triangles.iter().map(corners).filter(|[a, b, c]| a != b && b != c && c != a).count()

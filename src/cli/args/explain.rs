@@ -1,4 +1,4 @@
-//! What was typed after `meshray explain`.
+//! Arguments of `meshray explain`.
 
 use super::super::parse;
 use super::{AccelArgs, EyeArgs, ModelArgs};

@@ -1,4 +1,4 @@
-//! From where a command that draws one picture sees the model.
+//! Camera arguments of commands that draw one picture.
 
 use super::super::parse;
 use crate::scene::framing::NamedView;

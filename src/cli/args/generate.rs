@@ -1,4 +1,4 @@
-//! What was typed after `meshray generate`.
+//! Arguments of `meshray generate`.
 
 use super::super::parse;
 use super::MessageFormat;

@@ -1,4 +1,4 @@
-//! What was typed: syntax only. What it means together is decided in [`super::job`].
+//! Command-line arguments: syntax only. Their joint meaning is decided in [`super::job`].
 
 mod explain;
 mod eye;
@@ -78,7 +78,7 @@ pub(super) enum Command {
 }
 
 impl Command {
-    /// The instruction set that the kernels are kept to.
+    /// Instruction set to which the kernels are restricted.
     pub(super) fn simd(&self) -> Option<Level> {
         match self {
             Self::Render(args) => args.simd.simd,

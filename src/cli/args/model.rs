@@ -1,4 +1,4 @@
-//! Which model, and how it is loaded.
+//! Arguments for a model and how it is loaded.
 
 use super::super::parse;
 use super::MessageFormat;
@@ -60,7 +60,7 @@ pub(in crate::cli) struct LoadArgs {
 }
 
 impl LoadArgs {
-    /// What is asked of the loaders; which moment is shown is told apart, since a sequence has many.
+    /// Options of the loaders, except for the moment, which differs within a sequence.
     pub(in crate::cli) fn options(&self) -> LoadOptions {
         LoadOptions {
             root: self.root.clone(),
@@ -78,7 +78,7 @@ impl LoadArgs {
         }
     }
 
-    /// The usual limits, none of them above `--max-memory`.
+    /// Default limits, none of them above `--max-memory`.
     pub(in crate::cli) fn limits(&self) -> Limits {
         let usual = Limits::default();
         let Some(memory) = self.max_memory else { return usual };

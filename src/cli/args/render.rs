@@ -1,4 +1,4 @@
-//! What was typed after `meshray render`.
+//! Arguments of `meshray render`.
 
 use super::super::parse;
 use super::super::sampling::SamplingArgs;

@@ -1,4 +1,4 @@
-//! Parameters of a structure.
+//! Arguments for the parameters of structures.
 
 use super::super::parse;
 use crate::accel::{AccelKind, Assign, MailboxKind};
@@ -39,11 +39,11 @@ pub(in crate::cli) struct AccelArgs {
     pub mailbox: MailboxKind,
 }
 
-/// An option, and whether a structure has what it chooses.
+/// An option, and whether it affects a kind of structure.
 type Use = (&'static str, fn(AccelKind) -> bool);
 
 impl AccelArgs {
-    /// Whether each that was typed changes one of these structures; the error says which one does not, and what it is for.
+    /// Checks that each option typed affects one of these structures; the error names one that does not, and its structures.
     pub(in crate::cli) fn check_use(&self, kinds: &[AccelKind]) -> Result<(), String> {
         let idle = self.typed().find(|(_, has)| !kinds.iter().any(|kind| has(*kind)));
         let Some((option, has)) = idle else { return Ok(()) };
@@ -53,7 +53,7 @@ impl AccelArgs {
         Err(format!("{option} changes nothing of {these}; it is for {users}: choose one of these with --accel"))
     }
 
-    /// Those that were typed; a default cannot be told from its absence.
+    /// Options that were typed; one typed with its default value cannot be distinguished from an absent one.
     fn typed(&self) -> impl Iterator<Item = Use> {
         let options: [(bool, Use); 9] = [
             (self.grid_density.is_some(), ("--grid-density", AccelKind::has_grid)),

@@ -1,4 +1,4 @@
-//! What was typed after `meshray study`.
+//! Arguments of `meshray study`.
 
 use super::super::parse;
 use super::{EyeArgs, ModelArgs, SimdArgs};

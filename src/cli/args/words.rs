@@ -1,4 +1,4 @@
-//! Kinds of files, messages and colours, by the words that name them.
+//! Keywords that name kinds of files, messages and colour spaces.
 
 use crate::image::diff::Space;
 use clap::ValueEnum;

@@ -1,4 +1,4 @@
-//! What was typed after `meshray bench`.
+//! Arguments of `meshray bench`.
 
 use super::super::args::{AccelArgs, EyeArgs, LoadArgs, MessageFormat, SimdArgs};
 use super::super::parse;
@@ -10,7 +10,7 @@ use crate::generate::Family;
 use clap::{ArgAction, Args};
 use std::path::PathBuf;
 
-/// Flags that say how files are loaded; scenes made in memory are as they are.
+/// Flags on how files are loaded; they do not apply to generated scenes.
 const OF_FILES: [&str; 13] = [
     "up",
     "scene",
@@ -27,7 +27,7 @@ const OF_FILES: [&str; 13] = [
     "max_memory",
 ];
 
-/// Flags of rays, structures and passes; those that published figures ask for are known.
+/// Flags of rays, structures and passes; published figures prescribe them.
 const OF_RUNS: [&str; 23] = [
     "sizes",
     "accel",
@@ -169,7 +169,7 @@ mod tests {
             for flag in bench.get_opts().filter(|flag| *flag != mode) {
                 let (name, heading) = (flag.get_long().unwrap(), flag.get_help_heading().unwrap_or_default());
                 let is_used = OF_ALL.contains(&name) || more.contains(&name);
-                // What belongs to a baseline needs one.
+                // Flags that belong to a baseline require one.
                 let is_used = is_used || name == "fail-if" || mode.get_id() == "generate" && !of_files(heading);
                 let is_refused = refuses(mode, flag) || refuses(flag, mode);
                 assert!(is_refused || is_used, "--{name} beside --{}", mode.get_id());

@@ -1,4 +1,4 @@
-//! `--baseline` and `--fail-if`: counts that grew since an earlier report.
+//! `--baseline` and `--fail-if`: a gate on counts that grew since an earlier report.
 
 use super::super::exit::Exit;
 use super::super::message::Messages;
@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// An earlier report and what may have changed since.
+/// An earlier report and the changes allowed since.
 pub(super) struct Gate {
     path: PathBuf,
     baseline: Value,
@@ -17,7 +17,7 @@ pub(super) struct Gate {
 }
 
 impl Gate {
-    /// Reads the baseline, so that a wrong name is told before any work.
+    /// Reads the baseline, so that a wrong name is reported before any work.
     pub(super) fn read(path: &Path, limits: &[Limit], messages: &Messages) -> Result<Self, Exit> {
         let fail = |exit, text: String| {
             let fault = Diagnostic::new("baseline-unreadable", path, "", text);
@@ -31,7 +31,7 @@ impl Gate {
         Ok(Self { path: path.to_owned(), baseline, limits: limits.to_vec() })
     }
 
-    /// Says what changed too much.
+    /// Reports the counts that changed too much.
     pub(super) fn judge(&self, report: &Report, messages: &Messages) -> Exit {
         let now = serde_json::from_str(&json::write(report)).unwrap_or_default();
         match failures(&self.baseline, &now, &self.limits) {

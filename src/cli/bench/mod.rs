@@ -27,19 +27,19 @@ use scene::{Prepared, Subject};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// What is to be done, checked.
+/// Validated arguments of a run.
 struct Bench<'a> {
     args: &'a BenchArgs,
     files: Vec<(PathBuf, Format)>,
-    /// All inputs, the baseline, and the files that the models loaded so far use.
+    /// All inputs, the baseline, and the files used by the models loaded so far.
     sources: Sources,
     messages: Messages,
 }
 
-/// Compares on each model and tells how that ended: as the worst of them.
+/// Compares structures on each model; the exit code is the worst of all models.
 pub(super) fn run(args: &BenchArgs) -> Exit {
     let messages = Messages::new(args.messages.into(), args.quiet);
-    // Rays are what is measured, many passes of them.
+    // Most of the run traces rays, in many passes.
     huge_pages::allow(Duration::MAX);
     let (plan, files) = match (plan(args), files(args)) {
         (Ok(plan), Ok(files)) => (plan, files),
@@ -97,7 +97,7 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
     worst.max(gate.map_or(Exit::Done, |gate| gate.judge(&report, &bench.messages)))
 }
 
-/// What is measured, in order.
+/// Models to measure, in order.
 fn subjects(args: &BenchArgs) -> Vec<Subject> {
     match args.generate {
         Some(family) => args.sizes.0.iter().map(|&size| Subject::Generated(family, size)).collect(),
@@ -142,7 +142,7 @@ fn plan(args: &BenchArgs) -> Result<Plan, UsageError> {
     })
 }
 
-/// Those of `kinds` that the sweep changes.
+/// Those of `kinds` that are affected by the sweep.
 fn swept(sweep: &Sweep, kinds: Vec<AccelKind>, params: &AccelParams) -> Result<Vec<AccelKind>, UsageError> {
     let parameter = sweep.parameter;
     if parameter.is_set(params) {
@@ -175,7 +175,7 @@ fn files(args: &BenchArgs) -> Result<Vec<(PathBuf, Format)>, UsageError> {
     Ok(files)
 }
 
-/// A model of which nothing is measured yet: what it is, and which rays are sent, down to which depth.
+/// Report of a model before any row is measured: its facts, its rays, and the depth of the ray tree.
 fn head(prepared: &Prepared, name: &str, plan: &Plan, (sets, depth): (&[RaySet], u32)) -> Model {
     let Prepared { world, settings, .. } = prepared;
     Model {
@@ -199,7 +199,7 @@ fn head(prepared: &Prepared, name: &str, plan: &Plan, (sets, depth): (&[RaySet],
 }
 
 impl Bench<'_> {
-    /// One model: its rays, its rows, its tables.
+    /// Measures one model: its rays, rows and tables.
     fn model(&self, subject: &Subject, report: &mut Report) -> Exit {
         self.measure(subject, report).unwrap_or_else(|exit| exit)
     }
@@ -234,7 +234,7 @@ impl Bench<'_> {
         Ok(worst.max(self.print(&tables)).max(self.verdict(model)))
     }
 
-    /// Sends the rays through every structure. After each the report is written, so that a crash costs one row.
+    /// Sends the rays through every structure. The report is written after each one, so that a crash costs only one row.
     fn rows(
         &self,
         report: &mut Report,
@@ -253,7 +253,7 @@ impl Bench<'_> {
             !interrupt::raised()
         };
         let Prepared { world, loaded, settings, .. } = prepared;
-        // Maps of each value would be too many to look at.
+        // A sweep would give too many maps to look at.
         let pixels = if plan.sweep.is_some() { 0 } else { settings.width as usize * settings.height as usize };
         let textures = TextureStore::new(&loaded.scene);
         let filters = Filters::of(&loaded.scene, world, &textures, settings);
@@ -262,7 +262,7 @@ impl Bench<'_> {
         Ok(written.max(self.keep(report, &rows)))
     }
 
-    /// Whether what was measured agrees with itself; else it is said.
+    /// Reports hits or pixels that should be identical but differ.
     fn verdict(&self, model: &Model) -> Exit {
         let name = &model.name;
         if model.pruning.as_ref().is_some_and(|pruning| !pruning.same) {
@@ -277,14 +277,14 @@ impl Bench<'_> {
         self.messages.fail(&fault.remedy("please report it with the file"), Exit::Failed)
     }
 
-    /// Refuses a model of which a report would replace a file.
+    /// Refuses a model if a report would replace one of its files.
     fn spares(&self, loaded: &Loaded) -> Result<(), Diagnostic> {
         self.sources.add(&loaded.facts.files);
         self.files.iter().try_for_each(|(path, _)| self.sources.spared_by(path, "--report"))
     }
 
-    /// The plan for one model, and the structures that it leaves out. Where sizes grow, slow structures end where they
-    /// would take for ever, and a size whose scene was measured already is no new one.
+    /// Plan for one model, and the structures that it leaves out. For growing sizes, slow structures are dropped once they would
+    /// take too long, and a size that gives the same scene as an earlier one is refused.
     fn bearable(&self, report: &Report, prepared: &Prepared) -> Result<(Plan, Vec<AccelKind>), String> {
         let mut plan = report.plan.clone();
         if report.family.is_none() {
@@ -302,7 +302,7 @@ impl Bench<'_> {
         Ok((plan, left_out))
     }
 
-    /// A plan for those of its structures that can keep instances, where these are kept.
+    /// Restricts a plan to structures that can keep instances if the world keeps them.
     fn able(&self, plan: Plan, prepared: &Prepared, name: &str, left_out: &mut Vec<AccelKind>) -> Result<Plan, Exit> {
         if prepared.world.instanced.is_empty() {
             return Ok(plan);
@@ -342,7 +342,7 @@ impl Bench<'_> {
         self.write_as(|format| format.write(report))
     }
 
-    /// Writes every file that was asked for, but none over what a model was read from: that was said when it was loaded.
+    /// Writes the requested report files, except those that would replace a model's file: that was reported on loading.
     fn write_as(&self, text: impl Fn(Format) -> String) -> Exit {
         let mut exit = Exit::Done;
         for (path, format) in &self.files {

@@ -1,4 +1,4 @@
-//! What is measured, made ready for the one rendering whose rays are recorded.
+//! Loads a subject and prepares the rendering whose rays are recorded.
 
 use super::super::camera::Choice;
 use super::super::exit::Exit;
@@ -16,7 +16,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
 
-/// A file, or a generated scene and the triangles that are wanted.
+/// A file, or a family of generated scenes and the number of triangles requested.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Subject {
     File(PathBuf),
@@ -33,7 +33,7 @@ impl fmt::Display for Subject {
 }
 
 impl Subject {
-    /// What goes before the last part of a place in a message.
+    /// Path to name in messages.
     fn path(&self) -> &Path {
         match self {
             Self::File(path) => path,
@@ -41,7 +41,7 @@ impl Subject {
         }
     }
 
-    /// Its scene; what is wrong is said.
+    /// Loads the scene; faults are reported.
     fn load(&self, args: &BenchArgs, messages: &Messages) -> Result<Loaded, Exit> {
         match self {
             Self::File(path) => read::model_as_stored(path, &args.load, messages),
@@ -55,8 +55,8 @@ impl Subject {
 }
 
 impl Subject {
-    /// Its scene as all structures can store it, each instance by itself, where there is room; sizes of a family must be
-    /// alike, and their largest is known.
+    /// Prepares the scene for tracing: a file with its instances flattened if memory permits, so that all structures can store
+    /// it. Sizes of a family are all stored alike, and their largest is known to fit.
     fn world(&self, loaded: &Loaded, limit: u64) -> Result<World, Diagnostic> {
         match self {
             Self::File(path) => {
@@ -68,7 +68,7 @@ impl Subject {
     }
 }
 
-/// Of what a scene's meshes are made of; two sizes of a family with one hash are one scene.
+/// Hash of a scene's meshes and placements; two sizes of a family with one hash are the same scene.
 fn hash(scene: &Scene) -> u128 {
     let mut hash = Xxh3::new();
     for instance in &scene.instances {
@@ -81,7 +81,7 @@ fn hash(scene: &Scene) -> u128 {
     hash.digest128()
 }
 
-/// Everything the rendering needs but the structure.
+/// Everything that the rendering needs except the structure.
 pub(super) struct Prepared {
     pub loaded: Loaded,
     pub world: World,
@@ -91,7 +91,7 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// Loads and frames; what is wrong is said.
+    /// Loads and frames the subject; faults are reported.
     pub(super) fn new(subject: &Subject, args: &BenchArgs, messages: &Messages) -> Result<Self, Exit> {
         let choice = Choice::of(&args.eye, None).map_err(|wrong| messages.wrong(wrong))?;
         if let Some(fault) = picture::too_large_to_judge(args.size, args.load.limits().memory) {
@@ -111,12 +111,12 @@ impl Prepared {
         Ok(Self { loaded, world, settings, view_phrase, view })
     }
 
-    /// Lets `work` have it as a job. Which structure it has does not matter: all find the same hits.
+    /// Calls `work` with the rendering as a job. The choice of structure does not matter: all find the same hits.
     pub(super) fn with_job<T>(&self, work: impl FnOnce(&Job) -> T) -> T {
         self.job_in(&self.world, &TextureStore::new(&self.loaded.scene), &self.settings, work)
     }
 
-    /// What leaving out saves that the scene does not need; `None` when no thread can be started.
+    /// Measures the saving of pruning; `None` when no thread can be started.
     pub(super) fn pruning(&self, passes: usize) -> Option<Pruning> {
         let world = self.world.clone().without_pruning();
         let textures = TextureStore::new(&self.loaded.scene).without_pruning();

@@ -1,4 +1,4 @@
-//! `meshray bench --spd FOLDER`: our counts beside those published in 1999.
+//! `meshray bench --spd FOLDER`: compares our counts with those published in 1999.
 
 use super::super::exit::Exit;
 use super::super::interrupt;
@@ -13,7 +13,7 @@ use crate::load::{Diagnostic, LoadOptions, Loaded, Polygons, load};
 use std::path::{Path, PathBuf};
 
 impl Bench<'_> {
-    /// Measures every scene that is there.
+    /// Measures every scene found in the folder.
     pub(super) fn published(&self, folder: &Path) -> Exit {
         let file = |scene: &Scene| folder.join(format!("{}.nff", scene.name));
         let here: Vec<(&Scene, PathBuf)> =

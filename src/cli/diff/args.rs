@@ -1,4 +1,4 @@
-//! What was typed after `meshray diff`.
+//! Arguments of `meshray diff`.
 
 use super::super::args::{MessageFormat, SpaceArg};
 use super::super::parse;

@@ -1,11 +1,11 @@
-//! `--fail-if`: figures of a difference that are too much, or too little.
+//! `--fail-if`: limits on the figures of a difference.
 
 use super::Compared;
 use crate::bench::baseline::sides;
 use std::fmt;
 use std::str::FromStr;
 
-/// A figure that can be limited: its name, and where it is found.
+/// A figure that can be limited: its name, and the function that reads it.
 type Figure = (&'static str, fn(&Compared) -> f64);
 
 const FIGURES: [Figure; 9] = [
@@ -22,11 +22,11 @@ const FIGURES: [Figure; 9] = [
 
 const OF_LAYERS: &str = "layer-max";
 
-/// A limit, such as `rmse>0.01` or `psnr<40`.
+/// Limit on a figure, such as `rmse>0.01` or `psnr<40`.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::cli) struct Limit {
     figure: Figure,
-    /// Whether more is too much, or less too little.
+    /// Whether a figure above the bound breaks the limit; otherwise one below does.
     above: bool,
     bound: f64,
 }
@@ -45,12 +45,12 @@ impl FromStr for Limit {
 }
 
 impl Limit {
-    /// Whether it is one of layers, which only EXR files have.
+    /// Whether the limit concerns layers, which only EXR files have.
     pub(super) fn is_of_layers(&self) -> bool {
         self.figure.0 == OF_LAYERS
     }
 
-    /// What is wrong, if the figure is beyond it. What is no number is always beyond it.
+    /// Message if the figure is beyond the limit. NaN is always beyond it.
     pub(super) fn broken_by(&self, compared: &Compared) -> Option<String> {
         let value = (self.figure.1)(compared);
         let kept = if self.above { value <= self.bound } else { value >= self.bound };

@@ -1,4 +1,4 @@
-//! `meshray diff`: how different two pictures are, in numbers and as a picture.
+//! `meshray diff`: differences of two pictures, in numbers and as a picture.
 //!
 //! # Schema `meshray-diff/1`
 //! One JSON object: `version`, `expected`, `actual` (as typed), `width`, `height`, `space` (`display` or `linear`),
@@ -30,10 +30,10 @@ pub(super) use args::DiffArgs;
 use args::Show;
 use std::path::{Path, PathBuf};
 
-/// How much stronger the difference is drawn between both pictures.
+/// Factor by which the difference is amplified in the side-by-side picture.
 const GAIN: f32 = 8.0;
 
-/// Two pictures and how different they are.
+/// Two pictures and their difference.
 struct Compared {
     expected: Picture,
     actual: Picture,
@@ -42,19 +42,19 @@ struct Compared {
     looks: Looks,
     layers: Vec<LayerDifference>,
     layers_of_one: Vec<String>,
-    /// What neither was read nor compared: the file and what of it.
+    /// Parts of the files that were neither read nor compared, each with its file.
     left_out: Vec<String>,
 }
 
 impl Compared {
-    /// The greatest difference of a value of any layer; infinite where something of the files has nothing to be compared with.
+    /// Greatest difference of a value of any layer; infinite if a part of one file has no counterpart to compare with.
     fn layer_max(&self) -> f64 {
         let all = self.layers_of_one.is_empty() && self.left_out.is_empty();
         self.layers.iter().map(|layer| layer.max).fold(if all { 0.0 } else { f64::INFINITY }, f64::max)
     }
 }
 
-/// Compares, prints what was found, and draws it.
+/// Compares the pictures, prints the figures, and draws the difference.
 pub(super) fn run(args: &DiffArgs) -> Exit {
     let messages = Messages::new(args.messages.into(), false);
     panics::guard(&args.actual.display().to_string(), &messages, || {
@@ -69,10 +69,10 @@ pub(super) fn run(args: &DiffArgs) -> Exit {
     })
 }
 
-/// What went wrong, and how that ends.
+/// A fault, and the exit code that it causes.
 type Fault = Box<(Diagnostic, Exit)>;
 
-/// What is drawn replaces neither picture that is compared, and both drawings are files of their own.
+/// Checks that the drawings replace neither of the compared pictures and are two different files.
 fn check_outputs(args: &DiffArgs) -> Result<(), Fault> {
     let sources = Sources::of([&args.expected, &args.actual]);
     let outputs = [("-o", &args.output), ("--side-by-side", &args.side_by_side)];
@@ -123,7 +123,7 @@ fn compared(args: &DiffArgs, messages: &Messages) -> Result<Compared, Fault> {
     Ok(Compared { expected, actual, space, difference, looks, layers, layers_of_one, left_out })
 }
 
-/// Refuses what would do nothing with files of these kinds.
+/// Refuses options that have no effect on files of these kinds.
 fn check_use(args: &DiffArgs, kinds: [FileKind; 2], space: Space) -> Result<(), Fault> {
     let is_developed = space == Space::Display && kinds.contains(&FileKind::Exr);
     let has_layers = kinds == [FileKind::Exr; 2];
@@ -137,7 +137,7 @@ fn check_use(args: &DiffArgs, kinds: [FileKind; 2], space: Space) -> Result<(), 
     Err(Box::new((Diagnostic::new("usage", &args.actual, "", text), Exit::Usage)))
 }
 
-/// Warns of what is not compared since it is not read, and tells it.
+/// Warns of parts of the files that are not read and hence not compared, and returns them.
 fn told_left_out(files: [(&PathBuf, &PictureFile); 2], messages: &Messages) -> Vec<String> {
     let all = files.into_iter().flat_map(|(path, file)| file.left_out.iter().map(move |what| (path, what)));
     all.map(|(path, what)| {
@@ -148,7 +148,7 @@ fn told_left_out(files: [(&PathBuf, &PictureFile); 2], messages: &Messages) -> V
     .collect()
 }
 
-/// A picture as light of the display. What is no number stays so, though a picture shows something there: it is an error.
+/// Picture as light of the display. NaN is kept, although a developed picture shows a colour there: it is an error.
 fn displayed(picture: &Picture, development: &Output) -> Picture {
     let mut shown = developed(picture, development);
     let broken = picture.beauty.iter().map(|pixel| pixel.iter().any(|c| c.is_nan()));
@@ -156,7 +156,7 @@ fn displayed(picture: &Picture, development: &Output) -> Picture {
     shown
 }
 
-/// How EXR files become display colour.
+/// Output settings that turn EXR files into display colour.
 fn development(args: &DiffArgs) -> Output {
     let (tone_map, exposure) = (args.tone_map.unwrap_or(ToneMap::None), args.exposure.unwrap_or(0.0));
     Output { tone_map, exposure, ..Output::default() }
@@ -202,7 +202,7 @@ fn map(args: &DiffArgs, compared: &Compared) -> Result<Vec<u8>, ImageError> {
         .png(&Metadata::new())
 }
 
-/// What is told apart from nothing on a scale up to `most`: a power of ten, at least ten times less.
+/// Smallest value shown distinct from 0 on a scale up to `most`: a power of ten, at least ten times smaller.
 fn finest(most: f64) -> f64 {
     if most > 0.0 { libm::exp10(libm::floor(libm::log10(most)) - 1.0) } else { 0.1 }
 }
@@ -212,7 +212,7 @@ fn write(path: &Path, bytes: Result<Vec<u8>, ImageError>) -> Result<(), Fault> {
     interrupt::write_atomic(path, &bytes.map_err(|e| fault(e.to_string()))?).map_err(|e| fault(e.to_string()))
 }
 
-/// Prints the figures; a limit that is broken is said and decides how it ends.
+/// Prints the figures; a broken limit is reported and fails the command.
 fn tell(args: &DiffArgs, compared: &Compared, messages: &Messages) -> Result<Exit, Exit> {
     let broken: Vec<String> = args.fail_if.iter().filter_map(|limit| limit.broken_by(compared)).collect();
     let text = if args.json { report::json(args, compared, &broken) } else { report::text(args, compared) };

@@ -9,7 +9,7 @@ use crate::number::grouped;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
-/// For people: a line for each figure.
+/// Text report: one line per figure.
 pub(super) fn text(args: &DiffArgs, compared: &Compared) -> String {
     let (d, looks) = (&compared.difference, &compared.looks);
     let (width, height) = (compared.expected.width, compared.expected.height);
@@ -66,7 +66,7 @@ pub(super) fn text(args: &DiffArgs, compared: &Compared) -> String {
     })
 }
 
-/// For programs.
+/// JSON report.
 pub(super) fn json(args: &DiffArgs, compared: &Compared, broken: &[String]) -> String {
     let (d, looks) = (&compared.difference, &compared.looks);
     let exposures = looks.exposures.map(|e| json!({"first": e.first, "last": e.last, "count": e.count}));
@@ -113,14 +113,14 @@ pub(super) fn json(args: &DiffArgs, compared: &Compared, broken: &[String]) -> S
     format!("{report:#}\n")
 }
 
-/// Which of both pictures.
+/// One of the two pictures.
 #[derive(Clone, Copy)]
 enum Side {
     Expected,
     Actual,
 }
 
-/// The values that were compared at the worst pixel.
+/// Compared values of the worst pixel.
 fn compared_values(compared: &Compared, side: Side) -> Vec<f64> {
     let picture: &Picture = match side {
         Side::Expected => &compared.expected,
@@ -135,17 +135,17 @@ fn at(compared: &Compared, side: Side) -> String {
     compared_values(compared, side).into_iter().map(figure).collect::<Vec<_>>().join(" ")
 }
 
-/// A ratio of signal to noise.
+/// Formats a signal-to-noise ratio.
 fn decibels(psnr: f64) -> String {
     match psnr {
         f64::INFINITY => "infinite: the colours are equal".into(),
-        // No sign where it rounds to nothing.
+        // Avoid a negative zero.
         finite if finite.is_finite() => format!("{:.2} dB", (finite * 100.0).round() / 100.0 + 0.0),
         other => figure(other),
     }
 }
 
-/// Four digits, as small errors need them.
+/// Formats a number with four significant digits, as small errors need them.
 fn figure(x: f64) -> String {
     match x {
         0.0 => "0".into(),

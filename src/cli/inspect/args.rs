@@ -1,4 +1,4 @@
-//! What was typed after `meshray inspect`.
+//! Arguments of `meshray inspect`.
 
 use super::super::args::ModelArgs;
 use clap::Args;

@@ -1,18 +1,17 @@
-//! `meshray inspect`: what a file holds, as aligned text or as JSON.
+//! `meshray inspect`: contents of a file, as aligned text or as JSON.
 //!
 //! # Schema `meshray-inspect/1`
-//! One JSON object. `file`, `format`, `generator`, `hash`, `files` (all that were read); `triangles`, `polygons`,
-//! `faces`, `spheres`, `cones` (cylinders too), `planes`, `meshes`, `instances`, `materials`; `bounds` (`lo`, `hi`,
-//! metres) and `framed` (the same without strays) with `strays`; `units`, `up`, `up_reason`, `faces_back` (whether views
-//! turn with a front on the other side); `topology` (`corners`,
-//! `edges`, `open`, `non_manifold`, `duplicates`, `degenerate`; equal positions count as one corner; `by_object`: but
-//! not those of instances that are kept once, where all by themselves would take more memory than is allowed);
-//! `dropped` (by reason); `points_and_lines`, `wires` (of these `points` and `lines`, with `point_width` and
-//! `line_width` as drawn, metres; 0: none); `textures` (`name`, `width`, `height`); `missing` (files that were named
-//! but not found); `extensions` (`name`, `required`, `supported`); `scenes`, `scene`; `variants`, `variant` (the number
-//! of the one asked for, or null); `animations` (`name`, `seconds`, `channels`); `cameras`, `lights` (`name`, `kind`);
-//! `ambient` (light from everywhere, linear); `features` (needed) and `left_out`; `memory` (bytes: `scene`,
-//! `structure`); `max_rounding`; `warnings` (messages). Keys are only ever added.
+//! One JSON object. `file`, `format`, `generator`, `hash`, `files` (all that were read); `triangles`, `polygons`, `faces`,
+//! `spheres`, `cones` (cylinders too), `planes`, `meshes`, `instances`, `materials`; `bounds` (`lo`, `hi`, metres) and `framed`
+//! (the same without strays) with `strays`; `units`, `up`, `up_reason`, `faces_back` (whether named views are turned because the
+//! front is on the other side); `topology` (`corners`, `edges`, `open`, `non_manifold`, `duplicates`, `degenerate`; equal
+//! positions count as one corner; `by_object`: not across kept instances, if storing all of them separately would exceed the
+//! memory limit); `dropped` (by reason); `points_and_lines`, `wires` (`points` and `lines`, with `point_width` and `line_width`
+//! as drawn, metres; 0: none); `textures` (`name`, `width`, `height`); `missing` (files that were named but not found);
+//! `extensions` (`name`, `required`, `supported`); `scenes`, `scene`; `variants`, `variant` (index of the requested one, or
+//! null); `animations` (`name`, `seconds`, `channels`); `cameras`, `lights` (`name`, `kind`); `ambient` (uniform light, linear);
+//! `features` (needed) and `left_out`; `memory` (bytes: `scene`, `structure`); `max_rounding`; `warnings` (messages). Keys are
+//! only ever added.
 
 mod args;
 mod report;
@@ -26,7 +25,7 @@ use crate::render::Instancing;
 pub(super) use args::InspectArgs;
 use report::Report;
 
-/// Loads the file and prints what was found.
+/// Loads the file and prints its contents.
 pub(super) fn run(args: &InspectArgs) -> Exit {
     let messages = Messages::new(args.model.messages.into(), false);
     panics::guard(&args.model.input.display().to_string(), &messages, || inspect(args, &messages))

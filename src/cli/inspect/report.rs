@@ -1,4 +1,4 @@
-//! The findings of `meshray inspect`, gathered once and shown twice: as text and as JSON.
+//! Findings of `meshray inspect`, gathered once and shown as text or as JSON.
 
 use super::topology::Topology;
 use crate::accel::{AccelChoice, AccelParams};
@@ -14,7 +14,7 @@ use crate::scene::{Bitmap, LightKind, Mesh, Projection, Scene, UpAxis};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Everything there is to say about a file.
+/// All findings about a file.
 pub(super) struct Report<'a> {
     file: &'a Path,
     loaded: &'a Loaded,
@@ -24,7 +24,7 @@ pub(super) struct Report<'a> {
     features: Features,
     scene_bytes: u64,
     structure_bytes: u64,
-    /// Of a corner, by loading and by placing.
+    /// Maximum rounding error of a corner, by loading and by placing.
     rounding: f64,
 }
 
@@ -32,8 +32,8 @@ pub(super) struct Report<'a> {
 const SHOWN: usize = 8;
 
 impl<'a> Report<'a> {
-    /// Looks the scene through, which is placed as rendering does it; builds the structure that rendering would, to know its
-    /// size. Instances are each stored by themselves for a while where that takes no more than `limit` bytes.
+    /// Gathers the findings on a scene that is placed as for rendering; builds the structure that rendering would use, to learn
+    /// its size. Instances are temporarily stored separately if that takes no more than `limit` bytes.
     pub(super) fn new(file: &'a Path, loaded: &'a Loaded, world: World, limit: u64) -> Self {
         let scene = &loaded.scene;
         let topology = match World::flattened_bytes(scene) <= limit {
@@ -55,7 +55,7 @@ impl<'a> Report<'a> {
         }
     }
 
-    /// Aligned lines of `what  value`.
+    /// Aligned lines of label and value.
     pub(super) fn text(&self) -> String {
         let mut lines = Lines::default();
         self.identity(&mut lines);
@@ -187,7 +187,7 @@ impl<'a> Report<'a> {
         json!({ "points": points, "point_width": point_width, "lines": lines, "line_width": line_width })
     }
 
-    /// One JSON object (see the module's head).
+    /// One JSON object (schema in the module's documentation).
     pub(super) fn json(&self) -> String {
         let (scene, shapes, facts) = (&self.loaded.scene, &self.world.shapes, &self.loaded.facts);
         let named = |name: &str, kind: &str| json!({ "name": name, "kind": kind });
@@ -196,7 +196,7 @@ impl<'a> Report<'a> {
             false => Value::Null,
         };
         let bounds = hull(self.world.bounds.0, self.world.bounds.1);
-        // What is framed in nothing is no bounds.
+        // Without bounds there is nothing framed.
         let framed = if bounds.is_null() { Value::Null } else { hull(self.bounds.lo, self.bounds.hi) };
         let topology = &self.topology;
         let mut value = json!({
@@ -236,7 +236,7 @@ impl<'a> Report<'a> {
             "max_rounding": self.rounding,
             "warnings": self.loaded.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
         });
-        // One more in the macro would be too many.
+        // One more key would exceed the macro's recursion limit.
         value["faces_back"] = scene.faces_back.into();
         serde_json::to_string_pretty(&value).unwrap_or_default() + "\n"
     }
@@ -252,14 +252,14 @@ impl<'a> Report<'a> {
         }
     }
 
-    /// What was named but not there.
+    /// Files that are named but missing.
     fn missing(&self) -> Vec<String> {
         let missing = self.loaded.warnings.iter().filter(|w| w.code == FileFault::MISSING);
         missing.map(|w| w.text.clone()).collect()
     }
 }
 
-/// Lines with their labels in one column; empty values leave no line.
+/// Lines with aligned labels; empty values leave no line.
 #[derive(Default)]
 struct Lines {
     text: String,
@@ -316,7 +316,7 @@ fn vector(v: DVec3) -> String {
     format!("({}, {}, {})", part(v.x), part(v.y), part(v.z))
 }
 
-/// Bytes of the large arrays of the scene and of the shapes made of it.
+/// Size in bytes of the large arrays of the scene and of its shapes.
 fn scene_bytes(scene: &Scene, world: &World) -> u64 {
     let meshes: u64 = scene.meshes.iter().map(Mesh::bytes).sum();
     let bitmaps: u64 = scene.bitmaps.iter().map(Bitmap::bytes).sum();

@@ -1,38 +1,38 @@
-//! How faces hang together once equal positions count as one corner: open, non-manifold and repeated.
+//! Connectivity of faces, where equal positions count as one corner: open, non-manifold and duplicate parts.
 
 use crate::accel::Shapes;
 use crate::math::Vec3;
 use crate::render::{PrimSource, World};
 use crate::scene::Scene;
 
-/// Counts over all faces of a scene, as they stand in the world.
+/// Counts over all faces of a scene, in world space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Topology {
-    /// Distinct positions that faces use.
+    /// Distinct positions used by faces.
     pub corners: u64,
     /// Distinct edges.
     pub edges: u64,
-    /// Edges of one face only.
+    /// Edges of a single face.
     pub open: u64,
-    /// Edges of three faces or more.
+    /// Edges of three or more faces.
     pub non_manifold: u64,
-    /// Faces whose corners are those of an earlier face.
+    /// Faces with the same corners as an earlier face.
     pub duplicates: u64,
-    /// Faces with two corners in one place.
+    /// Faces with two corners at one position.
     pub degenerate: u64,
-    /// Whether instances of what is kept once count each by itself, although some may touch others.
+    /// Whether kept instances are counted separately, although some may touch others.
     pub by_object: bool,
 }
 
 impl Topology {
-    /// Looks at what is stored alone: of scenes that would take too much memory were each instance stored by itself.
+    /// Counts what is stored, each kept object times its instances: for scenes that would exceed memory with instances flattened.
     pub(super) fn by_object(scene: &Scene, world: &World) -> Self {
         let mut times = vec![0; world.instanced.objects().len()];
         let placed = world.instanced.placed().iter().filter(|placed| !is_wire(scene, world, placed.first));
         placed.for_each(|placed| times[placed.object as usize] += 1);
         let objects = world.instanced.objects().iter().zip(times).filter(|(_, times)| *times > 0);
         let objects = objects.map(|(object, times)| Self::of_faces(object.shapes(), |_| true).times(times));
-        // Beside what is kept once, what is stored has other numbers.
+        // If there are kept objects, prims of `world.shapes` are numbered differently, so that [`is_wire`] does not apply.
         let stored = match world.instanced.is_empty() {
             true => Self::of(scene, world),
             false => Self::of_faces(&world.shapes, |_| true),
@@ -41,7 +41,7 @@ impl Topology {
         Self { by_object: true, ..all }
     }
 
-    /// Looks at the faces of a scene each instance of which is stored by itself; points and lines have none.
+    /// Counts the faces of a scene with flattened instances; points and lines have none.
     pub(super) fn of(scene: &Scene, world: &World) -> Self {
         if !scene.meshes.iter().any(|mesh| mesh.is_wire) {
             return Self::of_faces(&world.shapes, |_| true);
@@ -73,7 +73,7 @@ impl Topology {
         }
     }
 
-    /// Looks at the triangles and polygons of `shapes`: of triangles at those that are `wanted`, by number.
+    /// Counts the triangles and polygons of `shapes`; of triangles only those whose index is `wanted`.
     fn of_faces(shapes: &Shapes, wanted: impl Fn(u32) -> bool) -> Self {
         let corner = weld(&shapes.vertices);
         let triangles = (0..).zip(&shapes.triangles).filter(|(prim, _)| wanted(*prim)).map(|(_, t)| t.to_vec());
@@ -113,7 +113,7 @@ impl Topology {
     }
 }
 
-/// Whether a prim is a part of a point or a line, which the file has no faces for.
+/// Whether a prim is part of a point or line, for which the file has no faces.
 fn is_wire(scene: &Scene, world: &World, prim: u32) -> bool {
     match world.source(prim) {
         PrimSource::Triangle { instance, .. } => scene.meshes[scene.instances[instance as usize].mesh as usize].is_wire,
@@ -121,7 +121,7 @@ fn is_wire(scene: &Scene, world: &World, prim: u32) -> bool {
     }
 }
 
-/// For each vertex the lowest one in the same place; −0 and 0 are the same place.
+/// Index of the first vertex at the same position, for each vertex; −0 and 0 are equal.
 fn weld(vertices: &[Vec3]) -> Vec<u32> {
     let key = |v: u32| (vertices[v as usize] + Vec3::ZERO).to_array().map(f32::to_bits);
     #[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 vertices")]

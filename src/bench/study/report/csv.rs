@@ -1,11 +1,11 @@
-//! One line for each setting.
+//! Study as CSV: one line per setting.
 
 use crate::bench::study::Study;
 
 const COLUMNS: &str = "file,flags,knob,cpu,cpu_min,cpu_max,wall,wall_min,wall_max,samples,rmse,noise,bias,max,worst_x,worst_y,flip,\
                        is_on_front,reference_error,width,height,threads,passes,seed,version";
 
-/// The whole table; times in seconds, errors codes 0..=1 of the displayed picture.
+/// Writes the whole table; times in seconds, errors in display codes 0..=1.
 pub fn write(study: &Study) -> String {
     let front = study.front();
     let mut text = format!("{COLUMNS}\n");
@@ -26,7 +26,7 @@ pub fn write(study: &Study) -> String {
     text
 }
 
-/// As RFC 4180 has it.
+/// Quotes a field as in RFC 4180.
 fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
 }

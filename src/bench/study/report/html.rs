@@ -1,4 +1,4 @@
-//! A page for a browser: what is advised, the front, the worst pixels, every row.
+//! Study as an HTML page: recommendations, the front, the worst pixels, every row.
 
 use crate::bench::machine::Machine;
 use crate::bench::report::html::svg::{Scale, WIDTH, open, plain, rule, unit, words};
@@ -11,7 +11,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write;
 
-/// The page.
+/// Writes the page.
 pub fn write(study: &Study) -> String {
     let (width, height) = study.size;
     let mut out =
@@ -55,7 +55,7 @@ fn advice(study: &Study) -> String {
     out + "</dl>\n"
 }
 
-/// The class of the style sheet, and the shape, that stand for a knob; four groups are enough to tell apart.
+/// CSS class, name and SVG path of the mark of a knob; more than a few groups could not be told apart.
 fn mark(knob: Knob) -> (&'static str, &'static str, &'static str) {
     match knob {
         Knob::Quality => {
@@ -121,7 +121,7 @@ fn legend(svg: &mut String) {
     }
 }
 
-/// The settings of the front where they are worst, beside how it should be.
+/// Worst pixels of the settings on the front, beside the reference.
 fn crops(study: &Study) -> String {
     let mut list = String::new();
     for i in study.front() {
@@ -177,7 +177,7 @@ fn table(study: &Study) -> String {
     out + "</tbody></table></div>\n"
 }
 
-/// What each knob that was turned costs and risks.
+/// Cost and risk of each knob that was varied.
 fn knobs(study: &Study) -> String {
     let mut out = "<h3>What knobs cost, and what they risk</h3>\n<div class=\"wide\"><table class=\"text\"><thead><tr><th>knob</th>\
                    <th>turned up, it costs</th><th>turned down, it risks</th></tr></thead><tbody>\n"

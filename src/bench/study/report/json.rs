@@ -1,12 +1,12 @@
-//! For programs.
+//! Study as JSON.
 //!
 //! # Schema `meshray-study/1`
-//! One JSON object: `version`, `file`, `hash`, `view`, `width`, `height`, `threads`, `machine`, `passes`, `seed`;
-//! `reference` (`samples` of a pixel, `error`: its own, `channels` compared); `rows`, in the order they were measured,
-//! each with `flags`, `knob`, `cpu_seconds` and `wall_seconds` (`median`, `min`, `max`), `samples` (eye rays of a
-//! pixel), `rmse`, `noise`, `bias`, `max`, `worst` (`x`, `y`), `flip`, `is_on_front`; `advice` (`purpose`, `flags` or
-//! null, `why`); `complete`. Errors are codes 0..=1 of the displayed picture; an `rmse` below half of the reference's
-//! `error` is not told from 0. Keys are only ever added.
+//! One JSON object: `version`, `file`, `hash`, `view`, `width`, `height`, `threads`, `machine`, `passes`, `seed`; `reference`
+//! (`samples` per pixel, `error` of the reference itself, `channels` compared); `rows` in the order of measurement, each with
+//! `flags`, `knob`, `cpu_seconds` and `wall_seconds` (`median`, `min`, `max`), `samples` (primary rays per pixel), `rmse`,
+//! `noise`, `bias`, `max`, `worst` (`x`, `y`), `flip`, `is_on_front`; `advice` (`purpose`, `flags` or null, `why`); `complete`.
+//! Errors are display codes 0..=1; an `rmse` below half of the reference's `error` cannot be distinguished from 0. Keys are only
+//! ever added.
 
 use crate::bench::clock::Spread;
 use crate::bench::machine::Machine;
@@ -14,7 +14,7 @@ use crate::bench::study::Study;
 use crate::number::hash;
 use serde_json::{Value, json};
 
-/// The whole study.
+/// Writes the whole study.
 pub fn write(study: &Study) -> String {
     let front = study.front();
     let rows: Vec<Value> = study

@@ -1,4 +1,4 @@
-//! A study as text, JSON, CSV and as a page for a browser.
+//! A study as text, JSON, CSV or HTML.
 
 pub mod csv;
 pub mod html;
@@ -8,19 +8,19 @@ pub mod text;
 use super::Study;
 use std::path::Path;
 
-/// What kind of file a report is.
+/// Formats of report files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// For programs (schema `meshray-study/1`).
+    /// JSON of schema `meshray-study/1`.
     Json,
-    /// A line for each setting.
+    /// One line per setting.
     Csv,
-    /// For a browser.
+    /// HTML page.
     Html,
 }
 
 impl Format {
-    /// By the ending of a name; the error says which endings there are.
+    /// Format by the file name's extension; the error lists the known extensions.
     pub fn from_path(path: &Path) -> Result<Self, String> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         match extension.as_deref() {
@@ -31,7 +31,7 @@ impl Format {
         }
     }
 
-    /// The report.
+    /// Writes the report in this format.
     pub fn write(self, study: &Study) -> String {
         match self {
             Self::Json => json::write(study),

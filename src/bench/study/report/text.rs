@@ -1,11 +1,11 @@
-//! For people: a line for each setting as it is measured, then the front and what is advised.
+//! Study as text: a line per setting as it is measured, then the front and the recommendations.
 
 use crate::bench::study::Study;
 use crate::bench::study::measure::Row;
 use crate::number::seconds;
 use std::fmt::Write;
 
-/// What stands above the rows.
+/// Text above the rows.
 pub fn head(study: &Study) -> String {
     let (width, height) = study.size;
     format!(
@@ -28,7 +28,7 @@ pub fn head(study: &Study) -> String {
     )
 }
 
-/// The line of one setting.
+/// Line of one setting.
 pub fn row(row: &Row) -> String {
     let error = row.error;
     format!(
@@ -44,7 +44,7 @@ pub fn row(row: &Row) -> String {
     )
 }
 
-/// What follows from the rows.
+/// Front and recommendations, after the rows.
 pub fn conclusion(study: &Study) -> String {
     let mut out = "\nnothing is both faster and nearer than these:\n".to_owned();
     for i in study.front() {
