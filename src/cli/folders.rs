@@ -16,9 +16,6 @@ use std::path::{Component, Path, PathBuf};
 ///
 /// Calls `tell` for folders without a model, for those that cannot be read, and for skipped archives; also returns the exit code
 /// that results.
-///
-/// `tell` hears of folders without a model, of those that cannot be read, and of what is left out; how the command ends because
-/// of these, too.
 pub(super) fn unfold(inputs: &[PathBuf], mut tell: impl FnMut(Severity, &Diagnostic)) -> (Vec<PathBuf>, Exit) {
     let (mut models, mut ended) = (Vec::new(), Exit::Done);
     let mut known: HashSet<PathBuf> = inputs.iter().filter(|input| !is_folder(input)).cloned().collect();
@@ -93,7 +90,7 @@ pub(super) fn way_below(folders: &[PathBuf], input: &Path) -> PathBuf {
 #[derive(Default)]
 struct Found {
     models: Vec<PathBuf>,
-    /// What is to be told, and how the command ends because of it.
+    /// Diagnostics to report, and the exit codes that they cause.
     told: Vec<(Severity, Diagnostic, Exit)>,
 }
 

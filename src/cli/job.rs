@@ -1,4 +1,4 @@
-//! What is to be done, checked: everything that can be known to be wrong before any work is told here.
+//! Validated job of a command line: all faults that can be found before any work are reported here.
 
 use super::archives::on_disk;
 use super::args::{AccelArgs, FileType, MessageFormat, RenderArgs, SpaceArg, StatsFormat};
@@ -18,155 +18,155 @@ use crate::scene::Background;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// A command line that cannot be carried out: one line, exit code 2.
+/// Fault in the command line: one line, exit code 2.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct UsageError(pub String);
 
-/// The error of such a command line.
+/// Fails with a [`UsageError`] of this text.
 pub(super) fn usage_error<T>(text: impl Into<String>) -> Result<T, UsageError> {
     Err(UsageError(text.into()))
 }
 
-/// Everything `meshray render` is to do.
+/// Everything that `meshray render` is to do.
 #[derive(Clone, Debug)]
 pub(super) struct RenderJob {
     /// One scene each, in the order given.
     pub batches: Vec<Batch>,
-    /// How to load; the moment of each picture is its own.
+    /// Options for loading, except for the moment, which each picture has itself.
     pub load: LoadOptions,
-    /// What the pictures of a scene have in common, if they belong together.
+    /// Sequence that the pictures of a scene belong to, if any.
     pub sequence: Option<Sequence>,
-    /// What the command line says about the picture; the rest comes from the scene or the defaults.
+    /// Settings of the picture from the command line; the rest comes from the scene or the defaults.
     pub look: Look,
-    /// Which structure.
+    /// Acceleration structure.
     pub accel: AccelChoice,
     /// Parameters of the structure.
     pub params: AccelParams,
-    /// Which ray/triangle test.
+    /// Ray/triangle test.
     pub intersector: IntersectorKind,
-    /// What becomes of meshes that are shown several times; flattened where the structure can do nothing else.
+    /// Treatment of instances; flattened if the structure supports nothing else.
     pub instances: Instancing,
-    /// 0: all.
+    /// Number of threads; 0: all.
     pub threads: usize,
-    /// Whether what the scene does without is done all the same.
+    /// Whether to run code paths that the scene does not need, too.
     pub no_prune: bool,
-    /// Heat maps beside each picture.
+    /// Heat maps to write beside each picture.
     pub heatmaps: Vec<Cost>,
-    /// What their brightest colour stands for; `None`: the most of any pixel.
+    /// Value of the heat maps' brightest colour; `None`: the maximum of all pixels.
     pub heatmap_max: Option<f64>,
-    /// Statistics, if wanted.
+    /// Statistics, if requested.
     pub stats: Option<Stats>,
-    /// Whether memory has a bound that was typed.
+    /// Whether a memory limit was typed.
     pub bounded: bool,
-    /// Whether to tell where the time went.
+    /// Whether to report where the time went.
     pub profile: bool,
-    /// Only warnings and errors.
+    /// Whether to print only warnings and errors.
     pub quiet: bool,
-    /// Warnings are errors.
+    /// Whether warnings are errors.
     pub strict: bool,
-    /// Nothing to draw is no error.
+    /// Whether a scene with nothing to draw is accepted.
     pub allow_empty: bool,
-    /// Whether pictures are only foretold.
+    /// Whether to forecast pictures instead of rendering them.
     pub dry_run: bool,
-    /// Pictures that are up to date are left alone, and the others say what they are made of.
+    /// Whether to skip pictures that are up to date, and to store in the others what they are made of.
     pub update: bool,
-    /// Keep the tiles that are done on Ctrl-C.
+    /// Whether to keep finished tiles on Ctrl-C.
     pub keep_partial: bool,
-    /// The picture that is repeated.
+    /// Picture to repeat.
     pub again: Option<PathBuf>,
-    /// What that says it was made of.
+    /// Stored hashes of what that picture was made of, as JSON.
     pub made_of: Option<String>,
-    /// The hash that the inputs must have (`--again`), in hexadecimal.
+    /// Hash that the inputs must have (`--again`), in hexadecimal.
     pub expected_hash: Option<String>,
 }
 
-/// One scene and the pictures of it.
+/// One scene and its pictures.
 #[derive(Clone, Debug)]
 pub(super) struct Batch {
     /// Files that make the scene; `-` is standard input.
     pub inputs: Vec<PathBuf>,
-    /// At least one.
+    /// Pictures of the scene, at least one.
     pub shots: Vec<Shot>,
 }
 
-/// One picture.
+/// One picture to render.
 #[derive(Clone, Debug)]
 pub(super) struct Shot {
-    /// Seen from where.
+    /// Choice of camera.
     pub choice: Choice,
-    /// Which part of the sequence it is, and which moment it shows.
+    /// Position in the sequence, and the moment shown.
     pub step: Step,
-    /// Written to where.
+    /// Output.
     pub target: Target,
-    /// What kind of file it is.
+    /// File type.
     pub kind: FileKind,
-    /// Whether folders are made for it.
+    /// Folder that may be created for the picture.
     pub growth: Growth,
 }
 
-/// What the command line says about the picture; `None`: nothing.
+/// Settings of the picture from the command line; `None` if not given.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Look {
-    /// Columns and rows.
+    /// Width and height in pixels.
     pub size: Option<(u32, u32)>,
-    /// Which rays pixels get, and through which lens.
+    /// Sampling of pixels, and the lens.
     pub sampling: SamplingArgs,
-    /// Bounces after the eye ray.
+    /// Maximum number of bounces after the primary ray.
     pub depth: Option<u32>,
-    /// Weight where a branch ends.
+    /// Weight below which a branch of the ray tree ends.
     pub cutoff: Option<f32>,
     /// Seed of every random stream.
     pub seed: u64,
-    /// Field of view or parallel rays.
+    /// Field of view, or orthographic height.
     pub lens: Option<LensChoice>,
-    /// Behind everything.
+    /// Background.
     pub background: Option<Background>,
-    /// Around everything.
+    /// Environment.
     pub env: Option<Env>,
-    /// That, once it was read.
+    /// Environment once it is read.
     pub env_read: EnvRead,
-    /// How far that is turned, degrees.
+    /// Rotation of the environment, in degrees.
     pub env_rotate: f64,
-    /// Rays to it from each point.
+    /// Environment rays from each point.
     pub env_rays: Option<u32>,
-    /// Rays that rough surfaces spread.
+    /// Number of rays that a rough surface spreads.
     pub gloss_rays: Option<u32>,
     /// Shadow rays to each area light.
     pub light_rays: Option<u32>,
-    /// How wide directional lights look, degrees.
+    /// Angular diameter of directional lights, in degrees.
     pub sun_size: Option<f64>,
-    /// Curve from scene light to display light.
+    /// Tone curve from scene light to display light.
     pub tone_map: Option<ToneMap>,
-    /// Stops.
+    /// Exposure, in stops.
     pub exposure: Option<f32>,
-    /// Bits of a PNG sample.
+    /// Bits per channel of a PNG.
     pub png: PngDepth,
-    /// Numbers in an EXR.
+    /// Number format of EXR samples.
     pub exr: ExrSamples,
-    /// Layers beside the beauty.
+    /// Whether to add layers beside the beauty layer.
     pub layers: bool,
-    /// What each pixel cost, as further layers.
+    /// Costs per pixel to add as further layers.
     pub costs: Vec<Cost>,
 }
 
-/// Statistics and where they go.
+/// Statistics and their destination.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Stats {
-    /// For people or programs.
+    /// Text or JSON.
     pub format: StatsFormat,
-    /// `None`: standard output.
+    /// File; `None` for standard output.
     pub file: Option<PathBuf>,
 }
 
 impl RenderJob {
-    /// Checks what was typed. Touches no file.
+    /// Validates the arguments; accesses no file.
     pub(super) fn new(args: &RenderArgs) -> Result<Self, UsageError> {
         check_flags(args)?;
         args.sampling.check()?;
         if args.again.is_none() {
             args.sampling.check_target()?;
         }
-        // Pictures may carry parameters that did nothing for them.
+        // Repeated pictures may carry parameters that had no effect.
         let kinds = if args.again.is_some() { &AccelKind::ALL[..] } else { args.accel.kinds() };
         let choices = choices(args)?;
         let sequence = sequence::of(args)?;
@@ -205,18 +205,18 @@ impl RenderJob {
         })
     }
 
-    /// What is written beside each picture.
+    /// Files written beside each picture.
     pub(super) fn beside(&self) -> Beside<'_> {
         Beside { heatmaps: &self.heatmaps, partial: self.keep_partial }
     }
 
-    /// Where statistics are written, if that is a file.
+    /// File of the statistics, if any.
     pub(super) fn stats_file(&self) -> Option<&Path> {
         self.stats.as_ref()?.file.as_deref()
     }
 }
 
-/// Whether what is chosen can keep instances.
+/// Whether the choice of structure allows instances to be kept.
 pub(super) fn keeps_instances(choice: AccelChoice) -> bool {
     match choice {
         AccelChoice::Auto => true,
@@ -224,7 +224,7 @@ pub(super) fn keeps_instances(choice: AccelChoice) -> bool {
     }
 }
 
-/// What the structure and the test can do of what was asked.
+/// Checks the requested treatment of instances against structure and intersector.
 fn instances(args: &RenderArgs) -> Result<Instancing, UsageError> {
     let able = keeps_instances(args.accel);
     let exact = args.intersector == IntersectorKind::Exact;
@@ -281,7 +281,7 @@ fn check_flags(args: &RenderArgs) -> Result<(), UsageError> {
     Ok(())
 }
 
-/// Every view that was asked for; one default when none was.
+/// All requested views; the default one if none was.
 fn choices(args: &RenderArgs) -> Result<Vec<Choice>, UsageError> {
     if let Some(eye) = args.eye {
         let (at, up) = (args.at.map(Into::into), args.up_vector.map(Into::into));
@@ -299,14 +299,14 @@ fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -
     let steps = sequence::steps(args, sequence)?;
     let groups: Vec<Vec<PathBuf>> =
         if args.merge { vec![args.inputs.clone()] } else { args.inputs.iter().map(|i| vec![i.clone()]).collect() };
-    // A name that is made of theirs may be that of what belongs to another of them.
+    // A name made from a model's name may be that of a file belonging to another model.
     let is_made = args.output.as_deref().is_some_and(|name| name.contains('{'));
     let sources: HashSet<PathBuf> =
         args.inputs.iter().filter(|_| is_made).map(|input| outputs::folder_of(on_disk(input))).collect();
     let mut batches = Vec::new();
     let mut frame = 0;
     for inputs in groups {
-        // Of several models in one picture none is where that belongs.
+        // A picture of several models belongs to the folder of none.
         let sub = if args.merge { PathBuf::new() } else { folders::way_below(&args.folders, &inputs[0]) };
         let mut shots = Vec::new();
         for (step, choice) in steps.iter().flat_map(|step| choices.iter().map(move |choice| (step, choice))) {
@@ -331,7 +331,7 @@ fn beside(args: &RenderArgs) -> Beside<'_> {
     Beside { heatmaps: &args.heatmap, partial: args.keep_partial }
 }
 
-/// Sizes that a type of file cannot hold, and flags that only one type can honour.
+/// Refuses sizes that a file type cannot hold, and flags that only one file type honours.
 fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), UsageError> {
     if let Some((width, height)) = args.size {
         for shot in batches.iter().flat_map(|b| &b.shots) {
@@ -348,7 +348,7 @@ fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), UsageError> {
     if args.bits.is_some() && all(FileKind::Exr) {
         return usage_error("--bits belongs to PNG; an EXR stores floats, of 16 bits, or 32 with --float");
     }
-    // A picture that is repeated carries both, whatever it is; and errors may be counted in colours for a display.
+    // A repeated picture carries both flags in any case; and errors may be measured in display colours.
     let serves = args.again.is_some() || args.sampling.error_space == Some(SpaceArg::Display);
     if (args.tone_map.is_some() || args.exposure.is_some()) && all(FileKind::Exr) && !serves {
         return usage_error(
@@ -384,7 +384,7 @@ fn look(args: &RenderArgs) -> Look {
     }
 }
 
-/// The parameters of the structures that may be built, checked.
+/// Validated parameters of the structures that may be built.
 pub(super) fn params(args: &AccelArgs, kinds: &[AccelKind]) -> Result<AccelParams, UsageError> {
     args.check_use(kinds).map_err(UsageError)?;
     let params = AccelParams {
@@ -405,7 +405,7 @@ pub(super) fn params(args: &AccelArgs, kinds: &[AccelKind]) -> Result<AccelParam
 
 fn stats(args: &RenderArgs) -> Option<Stats> {
     let file = args.stats_file.clone().filter(|f| f.as_path() != Path::new("-"));
-    // A dry run tells what it foretells in any case.
+    // A dry run reports its forecast in any case.
     let format = args.stats.or((args.dry_run && file.is_some()).then_some(StatsFormat::Text));
     format.map(|format| Stats { format, file })
 }
@@ -567,7 +567,7 @@ mod tests {
             "- --frames 0..3",
             "a.glb b.glb --merge --animation Run",
         ] {
-            // Some are known to the parser, others are told by the job.
+            // Some contradictions are found by the parser, others by the job.
             let words = ["meshray", "render"].into_iter().chain(line.split(' '));
             match Cli::try_parse_from(words) {
                 Err(error) => assert_ne!(error.kind(), clap::error::ErrorKind::UnknownArgument, "{line}"),

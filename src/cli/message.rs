@@ -1,7 +1,7 @@
 //! Messages: one line each to stderr, as text or as JSON objects.
 //!
-//! The JSON form is one object a line: `{"severity","code","file","place","text","remedy","count"}`; `severity` is
-//! `error`, `warning` or `info`, codes are stable. stdout holds only what was asked for, never a message.
+//! JSON messages are one object per line: `{"severity","code","file","place","text","remedy","count"}`; `severity` is `error`,
+//! `warning` or `info`, codes are stable. stdout carries only the requested output, never a message.
 
 use super::exit::Exit;
 use super::job::UsageError;
@@ -14,18 +14,18 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-/// How messages look.
+/// Format of messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Format {
-    /// For people.
+    /// Plain text.
     #[default]
     Text,
-    /// For programs.
+    /// JSON.
     Json,
 }
 
 impl Format {
-    /// What `--messages` says among words that may not be understood.
+    /// Value of `--messages` in a command line that may fail to parse.
     pub(super) fn asked_for(words: &[OsString]) -> Self {
         let apart = |pair: &[OsString]| pair[0] == "--messages" && pair[1] == "json";
         let is_json = words.iter().any(|word| word == "--messages=json") || words.windows(2).any(apart);
@@ -33,7 +33,7 @@ impl Format {
     }
 }
 
-/// What the parser of the command line says, as one message: its first paragraph, and its tips as the remedy.
+/// Turns an error of the command-line parser into one message: its first paragraph, with its tips as the remedy.
 pub(super) fn of_parser(said: &str) -> Diagnostic {
     let line = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut paragraphs = said.split("\n\n").map(line).filter(|p| !p.is_empty());
@@ -43,7 +43,7 @@ pub(super) fn of_parser(said: &str) -> Diagnostic {
     Diagnostic::new("usage", "", "", text).remedy(tips.join("; "))
 }
 
-/// The last line of a process that a signal ends.
+/// Last line of a process that is ended by a signal.
 pub(super) fn of_signal(format: Format) -> String {
     match format {
         Format::Text => "meshray: interrupted".into(),
@@ -53,19 +53,19 @@ pub(super) fn of_signal(format: Format) -> String {
     }
 }
 
-/// How bad a message is.
+/// Severity of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Severity {
-    /// What was asked for did not happen.
+    /// The requested action failed.
     Error,
-    /// It happened, but not quite as the input says.
+    /// The action succeeded, but deviates from what the input says.
     Warning,
-    /// A fact worth knowing; `--quiet` drops it.
+    /// Useful fact; dropped by `--quiet`.
     Info,
 }
 
 impl Severity {
-    /// The word in messages.
+    /// Name in messages.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Error => "error",
@@ -75,42 +75,42 @@ impl Severity {
     }
 }
 
-/// Lines that wait.
+/// Lines held back until they may be written.
 type Kept = Arc<Mutex<Vec<String>>>;
 
-/// All that wait, in the order in which they began to.
+/// All live buffers of held-back lines, in the order of their creation.
 static APART: Mutex<Vec<Weak<Mutex<Vec<String>>>>> = Mutex::new(Vec::new());
 
-/// Writes what still waits, before the process ends.
+/// Writes all lines still held back, before the process ends.
 pub(super) fn tell_all_apart() {
     let all = APART.lock().unwrap_or_else(PoisonError::into_inner);
     for apart in all.iter().filter_map(Weak::upgrade) {
-        // Whoever holds it writes.
+        // If the buffer is locked, its owner is writing it.
         if let Ok(mut lines) = apart.try_lock() {
             drop(std::io::stderr().write_all(std::mem::take(&mut *lines).concat().as_bytes()));
         }
     }
 }
 
-/// Where messages go, and how many of them were warnings.
+/// Sink of messages, with a count of the warnings.
 #[derive(Debug, Default)]
 pub(super) struct Messages {
     format: Format,
     quiet: bool,
     warnings: AtomicU32,
-    /// Lines that wait until it is their turn; `None`: none does.
+    /// Buffer of lines that are held back; `None` if lines are written at once.
     kept: Option<Kept>,
-    /// Bars on the same terminal; they step aside while a line is written.
+    /// Progress bars on the same terminal; they are suspended while a line is written.
     pub(super) bars: MultiProgress,
 }
 
 impl Messages {
-    /// Messages in a format; `quiet` drops facts, never errors and warnings.
+    /// Messages in a format; `quiet` drops facts, never errors or warnings.
     pub(super) fn new(format: Format, quiet: bool) -> Self {
         Self { format, quiet, ..Self::default() }
     }
 
-    /// Such messages that are kept until [`Self::tell`] writes them.
+    /// Sink of the same kind whose messages are held back until [`Self::tell`] writes them.
     pub(super) fn apart(&self) -> Self {
         let kept = Kept::default();
         let mut all = APART.lock().unwrap_or_else(PoisonError::into_inner);
@@ -119,12 +119,12 @@ impl Messages {
         Self { kept: Some(kept), ..Self::new(self.format, self.quiet) }
     }
 
-    /// Whether they are kept.
+    /// Whether messages are held back.
     pub(super) fn are_kept(&self) -> bool {
         self.kept.is_some()
     }
 
-    /// Writes the messages that were kept apart.
+    /// Writes the messages that `apart` holds back.
     pub(super) fn tell(&self, apart: &Self) {
         self.warnings.fetch_add(apart.warnings(), Ordering::Relaxed);
         if let Some(Ok(mut lines)) = apart.kept.as_ref().map(|kept| kept.lock())
@@ -148,11 +148,11 @@ impl Messages {
             lines.push(line + "\n");
             return;
         }
-        // Nobody left to read stderr is no reason to stop.
+        // A closed stderr is no reason to stop.
         self.bars.suspend(|| drop(writeln!(std::io::stderr(), "{line}")));
     }
 
-    /// Writes an error that is no file's fault.
+    /// Writes an error that does not concern a file.
     pub(super) fn error(&self, code: &'static str, text: impl Into<String>, remedy: impl Into<String>) {
         self.say(Severity::Error, &Diagnostic::new(code, "", "", text).remedy(remedy));
     }
@@ -162,35 +162,35 @@ impl Messages {
         self.say(Severity::Info, &Diagnostic::new(code, "", "", text));
     }
 
-    /// Writes why something could not be done, and gives how that ends.
+    /// Writes a fault, and returns `exit`.
     pub(super) fn fail(&self, fault: &Diagnostic, exit: Exit) -> Exit {
         self.say(Severity::Error, fault);
         exit
     }
 
-    /// Writes why a file could not be written.
+    /// Reports that a file could not be written.
     pub(super) fn unwritable(&self, file: &Path, why: &impl ToString) -> Exit {
         self.fail(&Diagnostic::new("output-unwritable", file, "", why.to_string()), Exit::Failed)
     }
 
-    /// Writes what is wrong with the command line.
+    /// Reports a fault of the command line.
     pub(super) fn wrong(&self, UsageError(text): UsageError) -> Exit {
         self.error("usage", text, "");
         Exit::Usage
     }
 
-    /// Prints to stdout; whatever keeps it from that is said.
+    /// Prints to stdout; failures are reported.
     pub(super) fn print(&self, text: &str) -> Result<(), Exit> {
         super::print(text).map_err(|why| self.unprintable(&why))
     }
 
-    /// Writes why something could not be printed.
+    /// Reports that something could not be printed.
     pub(super) fn unprintable(&self, why: &io::Error) -> Exit {
         self.error("output-unwritable", format!("standard output: {why}"), "");
         Exit::Failed
     }
 
-    /// Writes every fault that kept a file from being loaded.
+    /// Reports all faults that prevented a file from being loaded.
     pub(super) fn load_error(&self, error: &LoadError) -> Exit {
         match error {
             LoadError::Read { what, source } => {
@@ -204,13 +204,13 @@ impl Messages {
         error.into()
     }
 
-    /// Warnings so far, each counted as often as it was met.
+    /// Number of warnings so far, including repetitions.
     pub(super) fn warnings(&self) -> u32 {
         self.warnings.load(Ordering::Relaxed)
     }
 }
 
-/// What helps against a file that is not there: what else its folder has that is called almost so.
+/// Remedy for a missing file: a similar name in its folder, if there is one.
 fn other_name(file: &Path) -> String {
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let Ok(entries) = std::fs::read_dir(folder) else {

@@ -1,10 +1,9 @@
-//! The exposure of scenes whose lamps are given in lux and candela.
+//! Automatic exposure of scenes whose lamps are given in lux and candela.
 //!
-//! A lamp of a room has hundreds of candela and the sun a hundred thousand lux, which no picture shows as they are; many a
-//! file on the other hand counts from 0 to 1. So a small picture is taken first, and where what it shows is far too bright or
-//! too dark, the exposure that makes it right is used and said. Each view is exposed as if it were rendered alone; one exposure
-//! serves all pictures of a sequence, or it would flicker: that of the first that shows something lit, whichever of them are
-//! rendered.
+//! Room lamps have hundreds of candela and the sun a hundred thousand lux, far beyond what a display can show; many files, on the
+//! other hand, use values from 0 to 1. So a small picture is rendered first, and if it is far too bright or too dark, a
+//! correcting exposure is used and reported. Each view is exposed as if it were rendered alone. All pictures of a sequence share
+//! one exposure to avoid flicker: that of the first picture that shows something lit, whichever of them are rendered.
 
 use super::camera::Choice;
 use crate::image::Picture;
@@ -14,33 +13,33 @@ use crate::scene::features::is_unlit;
 use crate::scene::{MAX_STOPS, Scene};
 use std::time::Instant;
 
-/// Longest side of the small picture.
+/// Longest side of the small picture, in pixels.
 const SIDE: u32 = 96;
 
-/// Share of the model's pixels that may be brighter than [`BRIGHT`].
+/// Share of the model's pixels that may exceed the reference luminance.
 const ABOVE: f32 = 0.1;
 
-/// What the brightest but those are brought to …
+/// Reference luminance after exposure …
 const BRIGHT: f32 = 0.7;
 
-/// … where they are not between these already: such light is meant as it is.
+/// … which is only adjusted outside this range: light within it is taken as intended.
 const FINE: std::ops::RangeInclusive<f32> = 0.15..=1.5;
 
-/// Stops that are added to the pictures of each view, once they are known.
+/// Exposure in stops of each view metered so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Metered {
     stops: Vec<(Choice, f32)>,
-    /// What finding them took, until a picture has told it.
+    /// Seconds of metering that no picture has reported yet.
     seconds: f64,
 }
 
 impl Metered {
-    /// The stops of a view, where they are known.
+    /// Exposure of a view, if known.
     pub(super) fn get(&self, view: &Choice) -> Option<f32> {
         self.stops.iter().find(|(known, _)| known == view).map(|(_, stops)| *stops)
     }
 
-    /// The stops of a view, found where they are not known, and known from then on; `None` where nothing tells.
+    /// Exposure of a view, calculated by `find` and stored if unknown; `None` if `find` has no answer.
     pub(super) fn get_or_find(&mut self, view: &Choice, find: impl FnOnce() -> Option<f32>) -> Option<f32> {
         self.get(view).or_else(|| {
             let start = Instant::now();
@@ -51,18 +50,18 @@ impl Metered {
         })
     }
 
-    /// Seconds that finding them took since this was asked last.
+    /// Seconds of metering since the last call.
     pub(super) fn take_seconds(&mut self) -> f64 {
         std::mem::take(&mut self.seconds)
     }
 }
 
-/// Whether the exposure of a scene's pictures is to be found: it has lamps that are measured, and something answers to them.
+/// Whether a scene's pictures need metering: it has photometric lamps, and a surface that they light.
 pub(super) fn is_due(scene: &Scene) -> bool {
     scene.photometric && !is_unlit(scene)
 }
 
-/// Stops to add, 0 where the scene is to be shown as it is; `None` where nothing is lit.
+/// Exposure in stops, 0 if the scene needs no correction; `None` if nothing is lit.
 pub(super) fn exposure(job: &Job) -> Option<f32> {
     let Settings { width, height, .. } = *job.settings;
     let shrink = |side: u32| (u64::from(side) * u64::from(SIDE)).div_ceil(u64::from(width.max(height)));
@@ -81,17 +80,17 @@ pub(super) fn exposure(job: &Job) -> Option<f32> {
     };
     let picture = render(&Job { settings: &settings, ..*job }, &()).picture;
     let bright = bright(&picture)?;
-    // Tenths of a stop: what is printed is what is used.
+    // Tenths of a stop, so that the printed value is the exact one.
     let stops = || (libm::log2f(BRIGHT / bright) * 10.0).round() / 10.0;
     Some(if FINE.contains(&bright) { 0.0 } else { stops().clamp(-MAX_STOPS, MAX_STOPS) })
 }
 
-/// What is said of an exposure that was found.
+/// Note on a metered exposure.
 pub(super) fn phrase(stops: f32) -> String {
     format!("exposure {stops:+.1} stops (metered)")
 }
 
-/// What all but [`ABOVE`] of the model's pixels are at most as bright as; `None` where nothing is lit.
+/// Luminance that all but [`ABOVE`] of the model's lit pixels do not exceed; `None` if nothing is lit.
 fn bright(picture: &Picture) -> Option<f32> {
     let prims = &picture.layers.as_ref()?.prim;
     let seen = picture.beauty.iter().zip(prims).filter(|(_, prim)| **prim != u32::MAX);
@@ -112,7 +111,7 @@ mod tests {
     use crate::render::{View, World};
     use crate::scene::{Falloff, Light, LightKind, Material, Phong, Reflection, Scene, Sphere};
 
-    /// The exposure of a white ball under a lamp of so many candela, three units away; also with everything on.
+    /// Metered exposure of a white sphere three units below a lamp of this intensity; also checked without pruning.
     fn metered(candela: f32) -> Option<f32> {
         let kind = LightKind::Point {
             position: DVec3::new(0.0, 0.0, 4.0),

@@ -1,7 +1,7 @@
-//! Words -> jobs -> messages and exit codes: the command line.
+//! The command line: words -> jobs -> messages and exit codes.
 //!
-//! `args` is what was typed, `job` what that means once everything is checked; one file per command does the work.
-//! Only this module prints. stdout carries only what was asked for, everything else goes to stderr.
+//! `args` holds what was typed, `job` its validated meaning; one file per command does the work. Only this module prints. stdout
+//! carries only the requested output, everything else goes to stderr.
 
 mod again;
 mod archives;
@@ -57,7 +57,7 @@ use std::ffi::{OsStr, OsString};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Runs the command line `words`, whose first is the program's name.
+/// Runs the command line `words`, the first of which is the program's name.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
     let words = JOINED.iter().fold(with_render(words.into_iter().collect()), with_joined);
     let format = message::Format::asked_for(&words);
@@ -74,7 +74,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
     interrupt::install(format);
     panics::install();
     memory::keep_freed();
-    // What goes wrong outside of a model's own guard is said, too.
+    // Panics outside of a model's own guard are reported, too.
     panics::guard("meshray", &Messages::new(format, false), || carry_out(command))
 }
 
@@ -94,15 +94,15 @@ fn carry_out(command: Command) -> Exit {
     }
 }
 
-/// What `meshray render …` asks for, where the words are right. What is wrong, or to be explained, is found with all commands
-/// at hand: listing all their flags takes half a millisecond.
+/// Parses `meshray render …` without the other commands; `None` unless the words are valid. Errors and help are left to the full
+/// parser, since listing the flags of all commands takes half a millisecond.
 fn render_alone(words: &[OsString]) -> Option<Command> {
     let words = words.get(1..).filter(|words| words.first().is_some_and(|word| word == "render"))?;
     let matches = RenderArgs::augment_args(clap::Command::new("render")).try_get_matches_from(words).ok()?;
     RenderArgs::from_arg_matches(&matches).ok().map(|args| Command::Render(Box::new(args)))
 }
 
-/// What the words ask for. `-1` behind a flag that takes a value is that value: the flag then says what is wrong with it.
+/// Parses the words. `-1` after a flag with a value is taken as the value, so that the flag's own parser reports the fault.
 fn any_command(words: Vec<OsString>) -> Result<Command, clap::Error> {
     let with_negative = |arg: clap::Arg| {
         let has_value = arg.get_action().takes_values() && !arg.is_positional();
@@ -112,13 +112,13 @@ fn any_command(words: Vec<OsString>) -> Result<Command, clap::Error> {
     Cli::from_arg_matches(&grammar.try_get_matches_from(words)?).map(|cli| cli.command)
 }
 
-/// Says what is wrong with the words, or prints the help that they ask for.
+/// Reports a parse error, or prints the requested help.
 fn misunderstood(error: &clap::Error, format: message::Format) -> Exit {
     if error.use_stderr() && format == message::Format::Json {
         let fault = message::of_parser(&error.render().to_string());
         return Messages::new(format, false).fail(&fault, Exit::Usage);
     }
-    // Help is not printed before it has left the buffer; a reader that has enough is no fault.
+    // Flush, so that failures are noticed; a closed pipe is no fault.
     let printed = error.print().and_then(|()| io::stdout().flush());
     match printed {
         _ if error.use_stderr() => Exit::Usage,
@@ -165,7 +165,7 @@ fn render_command(typed: &RenderArgs) -> Exit {
     }
 }
 
-/// Lets `meshray MODEL` stand for `meshray render MODEL`: when the first word is no command but looks like a file.
+/// Expands `meshray MODEL` to `meshray render MODEL` if the first word is no command but looks like a file.
 fn with_render(mut words: Vec<OsString>) -> Vec<OsString> {
     let Some(first) = words.get(1) else { return words };
     let is_command = first.to_str().is_some_and(|word| Command::has_subcommand(word) || word == "help");
@@ -180,23 +180,23 @@ fn is_file(word: &OsStr) -> bool {
     !letters.starts_with(b"-") && (letters.iter().any(|c| b"./\\".contains(c)) || Path::new(word).exists())
 }
 
-/// A flag that may stand alone, and whether a word behind it is its value.
+/// A flag whose value is optional, and a test whether the following word is its value.
 type Joined = (&'static str, fn(&OsStr) -> bool);
 
 const JOINED: [Joined; 3] = [
-    // What is no list of costs is one that is mistyped, unless it is a file.
+    // A word that is no list of costs is taken for a mistyped one, unless it is a file.
     ("--layers", |word| word.to_str().is_some_and(|list| parse::costs(list).is_ok()) || !is_file(word)),
     ("--ortho", |word| word.to_str().is_some_and(|height| parse::ortho(height).is_ok()) || is_like_a_number(word)),
     ("--smooth", |word| word.to_str().is_some_and(|lean| parse::lean(lean).is_ok()) || is_like_a_number(word)),
 ];
 
-/// What begins as a number does is one that is mistyped, unless it is a file.
+/// Whether the word starts like a number and is no file: it is then taken for a mistyped value.
 fn is_like_a_number(word: &OsStr) -> bool {
     let letters = word.as_encoded_bytes();
     letters.first().is_some_and(|c| c.is_ascii_digit() || b"+.".contains(c)) && !Path::new(word).exists()
 }
 
-/// Lets `--layers tests,steps` stand for `--layers=tests,steps`, while in `--layers ship.glb` the flag stands alone.
+/// Rewrites `--layers tests,steps` as `--layers=tests,steps`, while in `--layers ship.glb` the flag stands alone.
 fn with_joined(mut words: Vec<OsString>, (flag, is_value): &Joined) -> Vec<OsString> {
     let flags = words.iter().position(|word| word == "--").unwrap_or(words.len());
     if let Some(at) = words[..flags].iter().position(|word| word == flag)
@@ -209,7 +209,7 @@ fn with_joined(mut words: Vec<OsString>, (flag, is_value): &Joined) -> Vec<OsStr
     words
 }
 
-/// Writes to stdout; a reader that has enough is no fault. Names of files may hold what steers a terminal, which is not written.
+/// Writes to stdout; a closed pipe is no fault. Control characters, which file names may contain, are replaced.
 fn print(text: &str) -> io::Result<()> {
     let steers = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
     let text = text.replace(steers, "\u{fffd}");

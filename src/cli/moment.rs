@@ -1,13 +1,13 @@
-//! Which moment of an animation was asked for.
+//! Requested moment of an animation.
 
 use super::args::MomentArgs;
 use super::job::UsageError;
 use crate::load::Moment;
 
-/// Frames a second where nobody says.
+/// Default frame rate, in frames per second.
 const FPS: f64 = 24.0;
 
-/// What was typed; `None`: the rest pose.
+/// Requested moment; `None`: the rest pose.
 pub(super) fn moment(args: &MomentArgs) -> Result<Option<Moment>, UsageError> {
     if args.fps.is_some() && args.frame.is_none() {
         return Err(UsageError("--fps says how long a frame is; add --frame N".into()));
@@ -17,7 +17,7 @@ pub(super) fn moment(args: &MomentArgs) -> Result<Option<Moment>, UsageError> {
     Ok(any.then(|| Moment { animation: args.animation.clone(), time: time.unwrap_or(0.0) }))
 }
 
-/// Frames a second.
+/// Frame rate, in frames per second.
 pub(super) fn fps(args: &MomentArgs) -> f64 {
     args.fps.unwrap_or(FPS)
 }

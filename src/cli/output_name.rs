@@ -1,9 +1,8 @@
-//! Where pictures go: templates, default names, and names that would collide.
+//! Names of pictures: templates, defaults, and collisions.
 //!
-//! Templates know `{dir}` (the input's folder), `{sub}` (the way to there from the folder that was named; nothing, and no slash
-//! behind it, if that is the same), `{stem}` (its name without extension), `{ext}` (its extension), `{view}` and `{frame}`
-//! (number of the picture: in its sequence, or else in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are
-//! plain braces.
+//! Template fields are `{dir}` (the input's folder), `{sub}` (path to it from the folder that was named; if they are the same, it
+//! and a following slash vanish), `{stem}` (file name without extension), `{ext}` (extension), `{view}` and `{frame}` (number of
+//! the picture: in its sequence, or else in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are literal braces.
 
 use crate::image::destination;
 use crate::load::paths::lexical;
@@ -12,12 +11,12 @@ use std::collections::HashMap;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf, is_separator};
 
-/// What a template is filled with.
+/// Values of the fields of a template.
 #[derive(Clone, Debug)]
 pub(super) struct Fields<'a> {
     /// The input, or `-`.
     pub input: &'a Path,
-    /// The way to its folder from the one that was named.
+    /// Path to the input's folder from the one that was named.
     pub sub: &'a Path,
     /// Name of the view or camera.
     pub view: &'a str,
@@ -40,17 +39,17 @@ pub(super) fn fill(template: &str, fields: &Fields) -> Result<PathBuf, String> {
     filled(template, fields, |_| false).map(|(name, _)| PathBuf::from(name))
 }
 
-/// The folder below which a template makes folders of its own: that in front of its first field, but for `{dir}`, which is
-/// there; `None` of a name without other fields.
+/// Folder below which a template may create folders: the part before its first field other than `{dir}`, whose folder exists.
+/// `None` for a template without such fields.
 pub(super) fn grows_in(template: &str, fields: &Fields) -> Result<Option<PathBuf>, String> {
     let (mut before, found) = filled(template, fields, |field| field != "dir")?;
-    // So that what stands behind the last separator is a name, also where that is nothing.
+    // Makes the last component a file name even if the text ends in a separator.
     before.push("x");
     let folder = Path::new(&before).parent().filter(|folder| !folder.as_os_str().is_empty());
     Ok(found.then(|| folder.unwrap_or(Path::new(".")).to_path_buf()))
 }
 
-/// What a template is filled to, up to the first field that is called so, and whether there was one.
+/// Fills a template up to the first field for which `ends` holds, and returns whether there was one.
 fn filled(template: &str, fields: &Fields, ends: impl Fn(&str) -> bool) -> Result<(OsString, bool), String> {
     let mut name = OsString::new();
     let mut rest = template;
@@ -66,7 +65,7 @@ fn filled(template: &str, fields: &Fields, ends: impl Fn(&str) -> bool) -> Resul
             }
             let value = value(field, fields)?;
             name.push(&value);
-            // No way at all is no folder.
+            // An empty path is no folder.
             rest = if value.is_empty() && field == "sub" {
                 after.strip_prefix(is_separator).unwrap_or(after)
             } else {
@@ -104,7 +103,7 @@ fn value(field: &str, fields: &Fields) -> Result<OsString, String> {
     }
 }
 
-/// Whether a file cannot be called so, or it would lie elsewhere. Windows takes what stands behind a colon for a part of a file
+/// Whether a character cannot occur in a file name, or would change its folder. On Windows, the part after a colon names a stream
 /// that few programs show.
 fn is_of_no_name(c: char) -> bool {
     matches!(c, '/' | '\\' | '\0') || cfg!(windows) && (c.is_control() || "<>:\"|?*".contains(c))
@@ -118,18 +117,18 @@ fn folder(input: &Path) -> OsString {
     input.parent().filter(|parent| !parent.as_os_str().is_empty()).map_or_else(|| ".".into(), Into::into)
 }
 
-/// What has to be in a name to tell the pictures of one input apart.
+/// Parts that a name needs to distinguish the pictures of one input.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Naming {
-    /// More than one view or camera.
+    /// Whether there are several views or cameras.
     pub several_views: bool,
-    /// Pictures of a sequence.
+    /// Whether pictures belong to a sequence.
     pub numbered: bool,
-    /// Inputs from below a folder, which is drawn as one.
+    /// Whether the input's folder below the named one is reproduced.
     pub mirrors: bool,
 }
 
-/// The template that is used when none is given, or when only a folder is.
+/// Template used if none is given, or only a folder.
 pub(super) fn default_template(folder: Option<&str>, naming: Naming, extension: &str) -> String {
     let name = match (naming.several_views, naming.numbered) {
         (false, false) => "{stem}",
@@ -144,19 +143,19 @@ pub(super) fn default_template(folder: Option<&str>, naming: Naming, extension: 
     }
 }
 
-/// A template that is filled to just this.
+/// Escapes braces, so that the filled template equals `plain`.
 pub(super) fn escape(plain: &str) -> String {
     plain.replace('{', "{{").replace('}', "}}")
 }
 
-/// The first two of `names` that are one file, as indices.
+/// Indices of the first two `names` that denote one file.
 pub(super) fn collision(names: &[PathBuf]) -> Option<(usize, usize)> {
     let mut seen = HashMap::new();
     names.iter().enumerate().find_map(|(i, name)| seen.insert(identity(name), i).map(|earlier| (earlier, i)))
 }
 
-/// One spelling for every way of writing the path of one file, through symbolic links too; the file itself need not
-/// exist. Of two hard links each is a file of its own: what is written replaces one name and leaves the other.
+/// Unique spelling of a file's path, with symbolic links resolved; the file need not exist. Hard links count as different files,
+/// since writing replaces one name and leaves the other.
 pub(super) fn identity(name: &Path) -> PathBuf {
     let name = &destination(name);
     if name.exists() {
@@ -167,7 +166,7 @@ pub(super) fn identity(name: &Path) -> PathBuf {
     in_one_case(parent.join(name.file_name().unwrap_or_default()))
 }
 
-/// Whether names in another case are, but for some disks, those of the same files.
+/// Whether names that differ in case denote the same file, as on most disks of these systems.
 const CASE_IS_IGNORED: bool = cfg!(any(windows, target_os = "macos"));
 
 fn in_one_case(name: PathBuf) -> PathBuf {
@@ -231,7 +230,7 @@ mod tests {
     #[test]
     fn two_spellings_of_one_file_collide() {
         let names = ["a.png", "b.png", "./nowhere/../a.png"].map(PathBuf::from);
-        // What is no folder leads nowhere, but on Windows.
+        // Except on Windows, `..` of a missing folder leads nowhere.
         assert_eq!(collision(&names), cfg!(windows).then_some((0, 2)));
         let names = ["a.png", "b.png", "src/../a.png"].map(PathBuf::from);
         assert_eq!(collision(&names), Some((0, 2)));

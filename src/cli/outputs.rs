@@ -1,4 +1,4 @@
-//! Where pictures go and what is written beside them, and which of these names would fall on each other.
+//! Destinations of pictures and of the files beside them, and their collisions.
 
 use super::args::RenderArgs;
 use super::camera::Choice;
@@ -12,19 +12,19 @@ use std::collections::HashSet;
 use std::fs;
 use std::path::{Component, Path, PathBuf, absolute, is_separator};
 
-/// Where a picture goes.
+/// Destination of a picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Target {
     /// Standard output.
     Stdout,
-    /// A file that is replaced whatever it holds.
+    /// File that is replaced whatever it contains.
     Named(PathBuf),
-    /// A file of our own choosing: only a picture that meshray wrote is replaced.
+    /// File name chosen by the program: only a picture written by meshray is replaced.
     Default(PathBuf),
 }
 
 impl Target {
-    /// A target of which, in one of these folders, only a picture that meshray wrote is replaced.
+    /// Restricts a target in one of these folders to replacing pictures written by meshray.
     pub(super) fn spares_beside(self, folders: &HashSet<PathBuf>) -> Self {
         match self {
             Self::Named(path) if !folders.is_empty() && folders.contains(&folder_of(&path)) => Self::Default(path),
@@ -32,7 +32,7 @@ impl Target {
         }
     }
 
-    /// The file, if it is one.
+    /// File path, if the target is a file.
     pub(super) fn path(&self) -> Option<&Path> {
         match self {
             Self::Stdout => None,
@@ -41,17 +41,17 @@ impl Target {
     }
 }
 
-/// The folder of a file, in one spelling, through symbolic links too.
+/// Folder of a file in a unique spelling, with symbolic links resolved.
 pub(super) fn folder_of(file: &Path) -> PathBuf {
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let written = || lexical(&absolute(folder).unwrap_or_else(|_| folder.to_path_buf()));
     folder.canonicalize().unwrap_or_else(|_| written())
 }
 
-/// The folder that may be made for a picture, in one that is there, and below which others may, if there is one.
+/// Folder that may be created for a picture, along with folders below it; its own parent must exist.
 pub(super) type Growth = Option<PathBuf>;
 
-/// Where the next picture goes, and as what.
+/// Destination, file type and folder of the next picture.
 pub(super) fn target(
     args: &RenderArgs,
     fields: &Fields,
@@ -69,7 +69,7 @@ pub(super) fn target(
         None => (name_again(args).unwrap_or_else(|| usual(None)), Target::Default),
     };
     let path = output_name::fill(&template, fields).map_err(UsageError)?;
-    // What leads out of it again is not made.
+    // Paths that lead out of the folder again do not create it.
     let holds = |base: &PathBuf| {
         let (base, path) = (lexical(base), lexical(&path));
         path.strip_prefix(&base).is_ok_and(|way| way.components().all(|part| matches!(part, Component::Normal(_))))
@@ -86,7 +86,7 @@ pub(super) fn target(
     Ok((kept(path), kind, growth))
 }
 
-/// What a picture that is repeated is called: as the one that it is made by.
+/// Template for a repeated picture: the file name of the original.
 fn name_again(args: &RenderArgs) -> Option<String> {
     let name = Path::new(args.again.as_ref()?.file_name()?);
     let kind = FileKind::from_path(name).ok()?;
@@ -94,54 +94,54 @@ fn name_again(args: &RenderArgs) -> Option<String> {
     fits.then(|| name.to_str().map(output_name::escape)).flatten()
 }
 
-/// What is written beside each picture, under a name made from its own.
+/// Files written beside each picture, named after it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Beside<'a> {
-    /// A heat map of each.
+    /// Costs shown by heat maps.
     pub heatmaps: &'a [Cost],
-    /// What is done of it when it is interrupted.
+    /// Whether an interrupted picture is kept.
     pub partial: bool,
 }
 
-/// Where the heat map of a picture goes: `ship.png` -> `ship-tests.png`.
+/// Destination of a heat map: `ship.png` -> `ship-tests.png`.
 pub(super) fn heat_map(picture: &Target, cost: Cost) -> Option<Target> {
     let path = picture.path()?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     Some(Target::Default(path.with_file_name(format!("{stem}-{cost}.png"))))
 }
 
-/// Where it goes as far as it is done when it is interrupted: `ship.png` -> `ship.partial.png`.
+/// Destination of an interrupted picture: `ship.png` -> `ship.partial.png`.
 pub(super) fn partial(picture: &Target) -> Option<Target> {
     picture.path().map(|path| Target::Default(output_name::partial(path)))
 }
 
-/// A picture and what is beside it.
+/// Destinations of a picture and of the files beside it.
 pub(super) fn of(shot: &Shot, beside: Beside) -> Vec<Target> {
     let maps = beside.heatmaps.iter().filter_map(|&cost| heat_map(&shot.target, cost));
     let partial = beside.partial.then(|| partial(&shot.target)).flatten();
     std::iter::once(shot.target.clone()).chain(maps).chain(partial).collect()
 }
 
-/// The files of these pictures and of what is beside them.
+/// Files of these pictures and those beside them.
 fn files<'a>(shots: impl Iterator<Item = &'a Shot>, beside: Beside) -> Vec<PathBuf> {
     shots.flat_map(|shot| of(shot, beside)).filter_map(|target| target.path().map(Path::to_path_buf)).collect()
 }
 
-/// The folder of a file, if it is one that may be made for pictures.
+/// Folder of a file, if it may be created for pictures.
 pub(super) fn grows_with<'a>(batches: &'a [Batch], file: &Path) -> Option<&'a Path> {
     let folder = file.file_name().and_then(|_| file.parent())?;
-    // Ways through a folder that is not there lead nowhere.
+    // Paths through a missing folder with `..` lead nowhere.
     let leads_back = folder.components().any(|part| part == Component::ParentDir);
     let whole = if leads_back { None } else { absolute(folder).ok() };
     let is_same = |growth: &&Path| *growth == folder || whole.is_some() && absolute(growth).ok() == whole;
     let growths = batches.iter().flat_map(|batch| &batch.shots).filter_map(|shot| shot.growth.as_deref());
-    // Pictures of one command mostly go to one.
+    // The pictures of one command mostly share a folder.
     let mut growths: Vec<&Path> = growths.collect();
     growths.dedup();
     growths.into_iter().find(is_same)
 }
 
-/// Makes the folder of a picture, if it is one that may be made.
+/// Creates the folder of a picture if allowed.
 pub(super) fn make_folder(shot: &Shot) -> Result<(), Diagnostic> {
     let folder = shot.growth.as_ref().and_then(|_| shot.target.path()?.parent());
     let Some(folder) = folder.filter(|folder| !folder.as_os_str().is_empty()) else { return Ok(()) };
@@ -150,7 +150,7 @@ pub(super) fn make_folder(shot: &Shot) -> Result<(), Diagnostic> {
     })
 }
 
-/// Refuses two pictures of one name.
+/// Refuses two pictures with the same file.
 pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), UsageError> {
     let shots: Vec<(&Path, &Shot)> =
         batches.iter().flat_map(|b| b.shots.iter().map(|s| (b.inputs[0].as_path(), s))).collect();
@@ -172,7 +172,7 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), UsageError> {
     if shots[a].0 == shots[b].0 && what(a) == what(b) {
         return usage_error(format!("{} is asked for twice; name it once", what(a)));
     }
-    // Most often one model in two types of file.
+    // The most common case is one model in two file types.
     let types = [a, b].map(|i| shots[i].0.extension());
     let example = if types[0] == types[1] { "" } else { ", as in 'thumbs/{sub}/{stem}.{ext}.png'" };
     usage_error(format!(
@@ -183,7 +183,7 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), UsageError> {
     ))
 }
 
-/// What is beside a picture is named after it, and must not fall on another.
+/// Checks that the files beside pictures do not collide.
 pub(super) fn check_beside(batches: &[Batch], beside: Beside) -> Result<(), UsageError> {
     let shots = || batches.iter().flat_map(|b| &b.shots);
     let heatmaps = beside.heatmaps;
@@ -208,7 +208,7 @@ pub(super) fn check_beside(batches: &[Batch], beside: Beside) -> Result<(), Usag
     }
 }
 
-/// Statistics must not fall on a picture or what is beside it.
+/// Checks that the statistics do not replace a picture or a file beside it.
 pub(super) fn check_stats_file(stats: Option<&Stats>, batches: &[Batch], beside: Beside) -> Result<(), UsageError> {
     let Some(file) = stats.and_then(|stats| stats.file.as_deref()) else { return Ok(()) };
     let names = files(batches.iter().flat_map(|b| &b.shots), beside);

@@ -1,4 +1,4 @@
-//! Faults of our own: a panic becomes one line and exit code 1, and a batch goes on after it.
+//! Internal faults: a panic becomes one line and exit code 1, and a batch goes on after it.
 
 use super::exit::Exit;
 use super::message::Messages;
@@ -6,10 +6,10 @@ use crate::load::Diagnostic;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Mutex;
 
-/// Where and why the last panic was, for its line.
+/// Place and reason of the first panic not yet reported.
 static LAST: Mutex<Option<String>> = Mutex::new(None);
 
-/// Keeps panics from printing; [`guard`] tells them.
+/// Keeps panics from printing; [`guard`] reports them.
 pub(super) fn install() {
     panic::set_hook(Box::new(|info| {
         let place = info.location().map(|l| format!("{}:{}", l.file(), l.line())).unwrap_or_default();
@@ -17,15 +17,15 @@ pub(super) fn install() {
         let text = payload.downcast_ref::<String>().map(String::as_str);
         let why = text.or(payload.downcast_ref::<&str>().copied()).unwrap_or("no reason given").replace('\n', " ");
         if let Ok(mut last) = LAST.lock() {
-            // The first is the cause; what follows is its wake.
+            // The first panic is the cause; later ones are its consequences.
             last.get_or_insert(format!("{place}: {why}"));
         }
     }));
 }
 
-/// Does `work` on `what`; a panic in it ends as [`Exit::Failed`].
+/// Runs `work` on `what`; a panic ends it with [`Exit::Failed`].
 pub(super) fn guard(what: &str, messages: &Messages, work: impl FnOnce() -> Exit) -> Exit {
-    // The state that `work` may leave half changed belongs to this batch alone and is dropped with it.
+    // Any state that `work` leaves half changed belongs to this batch alone and is dropped with it.
     panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
         let why = LAST.lock().ok().and_then(|mut last| last.take()).unwrap_or_default();
         let fault = Diagnostic::new("internal", what, "", format!("an error in meshray itself, at {why}"));

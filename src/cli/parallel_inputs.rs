@@ -1,8 +1,8 @@
-//! Many small scenes: several at a time, each on one thread.
+//! Renders many small scenes in parallel, each on one thread.
 //!
-//! Much of what a small picture takes is no work for many threads: reading, parsing, encoding, writing, and all that waits
-//! for a disk. Where there are many of them, threads that have one each are all at work until the last. Pictures are the
-//! same bytes, and messages come as if one of these inputs had followed the other; larger inputs come after them.
+//! Much of the time of a small picture is not parallel: reading, parsing, encoding, writing, and waiting for disks. With many
+//! small pictures, one thread for each keeps all threads busy until the last. Pictures have the same bytes as otherwise, and
+//! messages keep the order of these inputs; larger inputs come after them.
 
 use super::exit::Exit;
 use super::interrupt;
@@ -22,19 +22,19 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Inputs for each lane at least: the last ones leave lanes idle.
+/// Minimum number of inputs per lane: the last ones leave lanes idle.
 const MANY: usize = 4;
 
-/// Bytes of a small input at most. What is larger takes many threads well, and memory.
+/// Maximum size of a small input in bytes. Larger ones scale well to many threads, and need memory.
 const SMALL: u64 = 8 << 20;
 
-/// Pixels of a small picture at most.
+/// Maximum number of pixels of a small picture.
 const PIXELS: u64 = 1 << 20;
 
-/// Files and folders beside a model that are looked at.
+/// Maximum number of files and folders to look at beside a model.
 const LOOKED_AT: usize = 100_000;
 
-/// How a run over inputs ended: as its worst, and how many failed.
+/// Outcome of a run: the worst exit of all inputs, and the number of failed ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Ended {
     pub worst: Exit,
@@ -50,8 +50,7 @@ impl Ended {
     }
 }
 
-/// Renders all inputs, or as many as there are until a signal comes: those that are small side by side, where that pays, then the
-/// others one by one.
+/// Renders all inputs until a signal comes: small ones in parallel if that pays, then the others one by one.
 pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, run_state: &mut RunState) -> Ended {
     let lanes = if may_go_side_by_side(job) { pool.current_num_threads() } else { 1 };
     let (mut small, mut others) = (Vec::new(), Vec::new());
@@ -75,8 +74,8 @@ pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, run_s
     ended
 }
 
-/// Not where memory has a bound of its own, which is that of one scene, nor where times are wanted, what is done by a signal, or
-/// large pictures.
+/// Whether the job allows inputs in parallel: not with a memory limit, which applies to one scene, nor if times are requested,
+/// interrupted pictures are kept, or pictures are large.
 fn may_go_side_by_side(job: &RenderJob) -> bool {
     let usual = Settings::default();
     let (width, height) = job.look.size.unwrap_or((usual.width, usual.height));
@@ -85,21 +84,21 @@ fn may_go_side_by_side(job: &RenderJob) -> bool {
     small && !(job.bounded || times || job.dry_run || job.keep_partial || job.again.is_some())
 }
 
-/// How large inputs are.
+/// Estimates the sizes of inputs.
 struct Sizes {
-    /// Whether the size of their pictures was typed; NFF files say one themselves, which is known when they are read.
+    /// Whether the picture size was typed; NFF files bring their own, which is known only after reading.
     has_size: bool,
-    /// What lies beside models, folder by folder.
+    /// Bytes beside models, per model, for each folder.
     beside: HashMap<PathBuf, Option<u64>>,
 }
 
 impl Sizes {
-    /// Whether what a scene is read from is small: a file that holds all, or one with its share of all that lies beside it and in
-    /// the folders there, since it may name any of that.
+    /// Whether everything a scene is read from is small. Self-contained files count by themselves; others also count their share
+    /// of all files beside them and in the folders there, since they may name any of them.
     fn are_small(&mut self, batch: &Batch) -> bool {
         let mut length = |input: &PathBuf| {
             let kind = input.extension()?.to_str()?.to_ascii_lowercase();
-            // Of what is unpacked it has its share; what is not there is soon said.
+            // A file in an archive counts its share of it; a missing file fails quickly.
             let Ok(file) = input.metadata() else {
                 return Some(archive::in_archive(input).ok().flatten().map_or(0, |(archive, _)| archive.share()));
             };
@@ -119,7 +118,7 @@ impl Sizes {
     }
 }
 
-/// Bytes of what lies in a folder and in those in it beside models, for each model; `None` where that is much to look at.
+/// Bytes per model of other files in a folder and its direct subfolders; `None` with more than [`LOOKED_AT`] entries.
 fn beside(folder: &Path) -> Option<u64> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let (mut bytes, mut models, mut looked_at, mut left) = (0, 0, 0, vec![(folder.to_path_buf(), true)]);
@@ -143,8 +142,8 @@ fn beside(folder: &Path) -> Option<u64> {
     Some(bytes / models.max(1))
 }
 
-/// Whether its pictures replace nothing but pictures of ours: what another input reads is not known before that is loaded. Under
-/// names that are made up they never do.
+/// Whether the pictures of a scene replace no files but pictures written by meshray: files that other inputs read are not known
+/// before those are loaded. Default names never replace others.
 fn spares_others(batch: &Batch) -> bool {
     batch.shots.iter().all(|shot| match &shot.target {
         Target::Named(path) => !path.exists() || was_written_by_meshray(path),
@@ -152,10 +151,10 @@ fn spares_others(batch: &Batch) -> bool {
     })
 }
 
-/// Pictures of a scene that may be written, and how what was found out about the others ends.
+/// Shots of a scene that may be written, and the worst exit of the others.
 type Writable<'a> = (Vec<&'a Shot>, Exit);
 
-/// Renders the pictures of a scene; a panic ends these alone.
+/// Renders the pictures of a scene; a panic ends only these.
 fn guarded(
     job: &RenderJob,
     batch: &Batch,
@@ -184,18 +183,18 @@ fn side_by_side(
     std::thread::scope(|scope| {
         for _ in 0..lanes {
             let lane = || threads::pool(1).map_or((), |pool| queue.work(&pool));
-            // Where the system starts no more threads there are fewer lanes.
+            // If the system starts no more threads, there are fewer lanes.
             if std::thread::Builder::new().spawn_scoped(scope, lane).is_err() {
                 break;
             }
         }
     });
-    // And where it starts none, this one does it all.
+    // If it starts none, this thread does all the work.
     queue.work(pool);
     queue.end()
 }
 
-/// The inputs that wait for a lane.
+/// Inputs waiting for a lane.
 struct Queue<'a, 's> {
     job: &'a RenderJob,
     batches: &'a [&'a Batch],
@@ -205,19 +204,19 @@ struct Queue<'a, 's> {
 }
 
 struct State<'s> {
-    /// The input that the next free lane takes.
+    /// Index of the input that the next free lane takes.
     next: usize,
-    /// How many are done with.
+    /// Number of finished inputs.
     finished: usize,
-    /// Of so many from the first on all was told.
+    /// Number of leading inputs whose results are reported.
     told: usize,
-    /// What came of others, until those before them are told.
+    /// Results of finished inputs, until all inputs before them are reported.
     waiting: Vec<Option<Finished>>,
     run_state: &'s mut RunState,
     ended: Ended,
 }
 
-/// What came of an input.
+/// Results of an input.
 struct Finished {
     messages: Messages,
     run_state: RunState,
@@ -226,11 +225,11 @@ struct Finished {
 
 impl<'a, 's> Queue<'a, 's> {
     fn state(&self) -> MutexGuard<'_, State<'s>> {
-        // What a lane changes it changes as a whole.
+        // Every change of the state under the lock is complete, so a poisoned lock is harmless.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What a lane does.
+    /// Works through the queue on one lane.
     fn work(&self, pool: &ThreadPool) {
         while !interrupt::raised() {
             let Some((number, messages, shots, mut run_state)) = self.take() else { break };
@@ -239,7 +238,7 @@ impl<'a, 's> Queue<'a, 's> {
         }
     }
 
-    /// The next input, with messages of its own. Whether its pictures may be written is asked in the order of inputs.
+    /// Takes the next input, with its own messages. Writability of pictures is checked in the order of inputs.
     fn take(&self) -> Option<(usize, Messages, Writable<'a>, RunState)> {
         let mut state = self.state();
         let number = state.next;
@@ -270,7 +269,7 @@ impl<'a, 's> Queue<'a, 's> {
         state.ended.and(exit);
     }
 
-    /// Tells what was finished behind inputs that a signal has kept from being so.
+    /// Reports the results that follow inputs left unfinished because of a signal.
     fn end(self) -> Ended {
         self.progress.finish();
         let mut state = self.state();

@@ -1,4 +1,4 @@
-//! The words of single flags: sizes, vectors, angles, colours. Errors say what would be right.
+//! Parsers of the values of flags: sizes, vectors, angles, colours. Errors say what is expected.
 
 use crate::bench::range::{Spacing, values};
 use crate::generate::MAX_TRIANGLES;
@@ -12,19 +12,19 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::fmt;
 use std::path::PathBuf;
 
-/// Longest side of a picture.
+/// Longest side of a picture, in pixels.
 pub(super) const MAX_SIDE: u32 = crate::render::Settings::MOST_SIDE;
 
 /// `--ortho` as typed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Ortho {
-    /// Framed like the perspective camera would be.
+    /// Height framed as the perspective camera would be.
     Auto,
-    /// World units from the lower to the upper edge.
+    /// Height in world units from the lower to the upper edge.
     Height(f64),
 }
 
-/// Columns and rows, each 1 to [`MAX_SIDE`]; a single number is both.
+/// Parses width and height, each 1 to [`MAX_SIDE`]; a single number is both.
 pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
     let side = |s: &str| s.trim().parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n));
     let (w, h) = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
@@ -33,20 +33,20 @@ pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
     })
 }
 
-/// Column and row.
+/// Parses column and row of a pixel.
 pub(super) fn pixel(text: &str) -> Result<(u32, u32), String> {
     let side = |s: &str| s.trim().parse::<u32>().ok();
     let pixel = text.split_once(',').and_then(|(x, y)| Some((side(x)?, side(y)?)));
     pixel.ok_or_else(|| "write column,row from the top left, such as 400,300".into())
 }
 
-/// Numbers of cells on the three axes; their range is the structure's business.
+/// Parses cell counts on the three axes; the structure checks their range.
 pub(super) fn cells(text: &str) -> Result<[u32; 3], String> {
     let parts: Option<Vec<u32>> = text.split(['x', 'X', '×']).map(|n| n.trim().parse().ok()).collect();
     parts.and_then(|p| <[u32; 3]>::try_from(p).ok()).ok_or_else(|| "write three whole numbers, such as 46x46x3".into())
 }
 
-/// Three finite numbers, none larger than coordinates may be.
+/// Parses three finite numbers within the range of coordinates.
 pub(super) fn vec3(text: &str) -> Result<[f64; 3], String> {
     let parts: Option<Vec<f64>> = text.split(',').map(|p| finite(p).ok()).collect();
     let parts = parts.and_then(|p| <[f64; 3]>::try_from(p).ok()).ok_or("write three numbers, such as 1,0.5,-2")?;
@@ -58,7 +58,7 @@ pub(super) fn vec3(text: &str) -> Result<[f64; 3], String> {
     }
 }
 
-/// A direction: three finite numbers, not all 0.
+/// Parses a direction: three finite numbers, not all 0.
 pub(super) fn direction(text: &str) -> Result<[f64; 3], String> {
     let direction = vec3(text)?;
     if direction == [0.0; 3] {
@@ -77,12 +77,12 @@ fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
     if (low..=high).contains(&n) { Ok(n) } else { Err(format!("write a number from {low} to {high}")) }
 }
 
-/// Degrees.
+/// Parses a field of view in degrees.
 pub(super) fn fov(text: &str) -> Result<f64, String> {
     within(text, 0.1, 170.0)
 }
 
-/// Seconds, also with a unit: `1.5`, `1.5s`, `250ms`.
+/// Parses a time into seconds, with an optional unit: `1.5`, `1.5s`, `250ms`.
 pub(super) fn time(text: &str) -> Result<f64, String> {
     let wrong = || "write a time from 0, such as 1.5, 1.5s or 250ms".to_owned();
     let (number, units) = match (text.strip_suffix("ms"), text.strip_suffix('s')) {
@@ -93,10 +93,10 @@ pub(super) fn time(text: &str) -> Result<f64, String> {
     finite(number).ok().map(|n| n / units).filter(|&n| n >= 0.0).ok_or_else(wrong)
 }
 
-/// Most pictures of one sequence.
+/// Maximum number of pictures of a sequence.
 const MAX_PICTURES: u32 = 100_000;
 
-/// `--frames`: numbers from `first` to before `end`, at least one.
+/// `--frames`: numbers from `first` up to but excluding `end`, at least one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Frames {
     pub first: u32,
@@ -109,7 +109,7 @@ impl fmt::Display for Frames {
     }
 }
 
-/// `A..B` without B, or `A..=B` with it.
+/// Parses `A..B` without B, or `A..=B` with it.
 pub(super) fn frames(text: &str) -> Result<Frames, String> {
     let whole = |s: &str| s.trim().parse::<u32>().ok();
     let (first, last) = text.split_once("..").ok_or("write A..B, or A..=B to take in B, such as 0..48")?;
@@ -127,15 +127,15 @@ pub(super) fn frames(text: &str) -> Result<Frames, String> {
     }
 }
 
-/// `--turntable`: pictures of one turn, or one of them.
+/// `--turntable`: pictures of one turn, or a single one of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Turns {
     pub count: u32,
-    /// The number of the only one wanted, from 0.
+    /// Index of the single picture requested, from 0.
     pub only: Option<u32>,
 }
 
-/// `N`, or `I/N` for number I alone.
+/// Parses `N`, or `I/N` for picture I alone.
 pub(super) fn turns(text: &str) -> Result<Turns, String> {
     let whole = |s: &str| s.trim().parse::<u32>().ok();
     let (only, count) = match text.split_once('/') {
@@ -151,30 +151,30 @@ pub(super) fn turns(text: &str) -> Result<Turns, String> {
     }
 }
 
-/// Stops.
+/// Parses an exposure in stops.
 #[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
 pub(super) fn exposure(text: &str) -> Result<f32, String> {
     let most = f64::from(MAX_STOPS);
     within(text, -most, most).map(|n| n as f32)
 }
 
-/// A weight.
+/// Parses a weight from 0 to 1.
 #[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
 pub(super) fn cutoff(text: &str) -> Result<f32, String> {
     within(text, 0.0, 1.0).map(|n| n as f32)
 }
 
-/// An error or a difference of channels.
+/// Parses an error or a difference of channels.
 #[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
 pub(super) fn error(text: &str) -> Result<f32, String> {
     within(text, 1e-6, 1e6).map(|n| n as f32)
 }
 
-/// A probability, as it is or in percent.
+/// Parses a probability, as a fraction or in percent.
 pub(super) fn confidence(text: &str) -> Result<f64, String> {
     let n = match text.strip_suffix('%') {
         Some(percent) => finite(percent)? / 100.0,
-        // No probability is above 1.
+        // Above 1 it must be a percentage.
         None => match finite(text)? {
             n if n > 1.0 => n / 100.0,
             n => n,
@@ -184,36 +184,36 @@ pub(super) fn confidence(text: &str) -> Result<f64, String> {
     if known { Ok(n) } else { Err("write a confidence from 50% to 99.99%".into()) }
 }
 
-/// A radius.
+/// Parses a radius.
 pub(super) fn radius(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|&n| n >= 0.0).ok_or_else(|| "write a radius, 0 or more".into())
 }
 
-/// What is sharp.
+/// Focus as typed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Focus {
-    /// So far along the line of sight.
+    /// Distance along the line of sight.
     Distance(f64),
-    /// What is as far as this point.
+    /// Distance of this point.
     Point([f64; 3]),
 }
 
-/// A distance or a point.
+/// Parses a distance or a point.
 pub(super) fn focus(text: &str) -> Result<Focus, String> {
     if text.contains(',') { vec3(text).map(Focus::Point) } else { above_zero(text).map(Focus::Distance) }
 }
 
-/// The name of a value of this kind.
+/// Parses the name of a value of type `T`.
 pub(super) fn named<T: Named>() -> impl TypedValueParser<Value = T> {
     PossibleValuesParser::new(T::names()).try_map(|name: String| name.parse::<T>())
 }
 
-/// Bounces after the eye ray.
+/// Parses the maximum number of bounces after the primary ray.
 pub(super) fn depth() -> impl TypedValueParser<Value = u32> {
     clap::value_parser!(u32).range(0..=i64::from(MAX_DEPTH))
 }
 
-/// A height, or `auto`.
+/// Parses a height, or `auto`.
 pub(super) fn ortho(text: &str) -> Result<Ortho, String> {
     if text == "auto" {
         return Ok(Ortho::Auto);
@@ -222,21 +222,21 @@ pub(super) fn ortho(text: &str) -> Result<Ortho, String> {
     if height > 0.0 { Ok(Ortho::Height(height)) } else { Err("the height must be above 0".into()) }
 }
 
-/// A number that is not below 0.
+/// Parses a number not below 0.
 pub(super) fn not_negative(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|&n| n >= 0.0).ok_or_else(|| "write 0 or a number above it".into())
 }
 
-/// A number above 0.
+/// Parses a number above 0.
 pub(super) fn above_zero(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|&n| n > 0.0).ok_or_else(|| "write a number above 0".into())
 }
 
-/// Costs that are stored in layers; none are named by `--layers` alone.
+/// Costs to store as layers; `--layers` alone names none.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct CostList(pub Vec<Cost>);
 
-/// Names of costs with commas between them, or nothing.
+/// Parses a comma-separated list of costs, possibly empty.
 pub(super) fn costs(text: &str) -> Result<CostList, String> {
     let mut costs = Vec::new();
     for name in text.split(',').filter(|_| !text.is_empty()) {
@@ -248,7 +248,7 @@ pub(super) fn costs(text: &str) -> Result<CostList, String> {
     Ok(CostList(costs))
 }
 
-/// 8 or 16.
+/// Parses a bit depth: 8 or 16.
 pub(super) fn bits(text: &str) -> Result<u8, String> {
     match text {
         "8" => Ok(8),
@@ -257,27 +257,27 @@ pub(super) fn bits(text: &str) -> Result<u8, String> {
     }
 }
 
-/// A number of things, at least one.
+/// Parses a count of at least one.
 pub(super) fn positive(text: &str) -> Result<usize, String> {
     text.parse().ok().or_else(|| in_powers(text)).filter(|&n| n > 0).ok_or_else(|| "write a number from 1".into())
 }
 
-/// A number of rays of a class of which a recording has as many, or all.
+/// Parses a number of rays per class, at most as many as a recording is sure to hold.
 pub(super) fn rays(text: &str) -> Result<usize, String> {
     const MOST: usize = Tape::LIMIT / 2;
     positive(text).ok().filter(|&n| n <= MOST).ok_or_else(|| format!("write a number from 1 to {MOST}"))
 }
 
-/// A whole number written as `1e6`.
+/// Parses a whole number written as `1e6`.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
 fn in_powers(text: &str) -> Option<usize> {
-    /// Beyond this not all whole numbers are there.
+    /// Beyond this, `f64` lacks some whole numbers.
     const MOST: f64 = (1_u64 << 53) as f64;
     let number = text.parse::<f64>().ok().filter(|n| n.fract() == 0.0 && (0.0..=MOST).contains(n))?;
     usize::try_from(number as u64).ok()
 }
 
-/// A number of triangles that a scene can be generated with, also as `1e6`.
+/// Parses a number of triangles within the range of generated scenes, also as `1e6`.
 pub(super) fn triangles(text: &str) -> Result<usize, String> {
     let number = text.parse::<f64>().ok().filter(|n| (1.0..=MAX_TRIANGLES as f64).contains(n));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
@@ -288,13 +288,13 @@ pub(super) fn triangles(text: &str) -> Result<usize, String> {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Sizes(pub Vec<usize>);
 
-/// A list or a range of numbers of triangles, each as [`triangles`] has them.
+/// Parses a list or a range of numbers of triangles, each within the range of [`triangles`].
 pub(super) fn sizes(text: &str) -> Result<Sizes, String> {
     let sizes = values(text, Spacing::Tens, true)?;
     sizes.iter().map(|n| triangles(&n.to_string())).collect::<Result<_, _>>().map(Sizes)
 }
 
-/// Bytes with an optional binary suffix: `500M`, `2G`, `2GiB`.
+/// Parses bytes with an optional binary suffix: `500M`, `2G`, `2GiB`.
 pub(super) fn bytes(text: &str) -> Result<u64, String> {
     let wrong = || "write a size such as 500M or 2G".to_owned();
     let digits = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
@@ -310,7 +310,7 @@ pub(super) fn bytes(text: &str) -> Result<u64, String> {
     number.checked_mul(1 << shift).filter(|&n| n > 0).ok_or_else(wrong)
 }
 
-/// A colour, `transparent` or `env`.
+/// Parses a background: a colour, `transparent` or `env`.
 pub(super) fn background(text: &str) -> Result<Background, String> {
     match text {
         "transparent" => Ok(Background::Transparent),
@@ -321,16 +321,16 @@ pub(super) fn background(text: &str) -> Result<Background, String> {
     }
 }
 
-/// What surrounds the scene, as typed.
+/// Environment as typed.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Env {
-    /// One of the built-in ones.
+    /// Built-in environment.
     BuiltIn(Environment),
-    /// A picture.
+    /// Panorama picture.
     File(PathBuf),
 }
 
-/// `studio`, `white`, `black`, or a file.
+/// Parses `studio`, `white`, `black`, or a file name.
 pub(super) fn env(text: &str) -> Result<Env, String> {
     match text {
         "studio" => Ok(Env::BuiltIn(Environment::Studio)),
@@ -341,7 +341,7 @@ pub(super) fn env(text: &str) -> Result<Env, String> {
     }
 }
 
-/// The angle under which a disc in the sky is seen, degrees.
+/// Parses the angular diameter of a disc in the sky, in degrees.
 pub(super) fn sun(text: &str) -> Result<f64, String> {
     degrees(text)
         .ok()
@@ -349,28 +349,28 @@ pub(super) fn sun(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "write an angle of 0 to 180 degrees".to_owned())
 }
 
-/// The angle between two faces: degrees are written, radians come of it.
+/// Parses the angle between two faces: degrees are typed, radians returned.
 pub(super) fn lean(text: &str) -> Result<f64, String> {
     sun(text).map(f64::to_radians)
 }
 
-/// An angle in degrees.
+/// Parses an angle in degrees.
 pub(super) fn degrees(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|d: &f64| d.is_finite()).ok_or_else(|| "write an angle in degrees such as 90".to_owned())
 }
 
-/// How finely somebody sees a picture.
+/// Parses the pixels per degree of the visual field.
 pub(super) fn pixels_per_degree(text: &str) -> Result<f64, String> {
     let wrong = || format!("write a number from {} to {}", PIXELS_PER_DEGREES.start(), PIXELS_PER_DEGREES.end());
     finite(text).ok().filter(|n| PIXELS_PER_DEGREES.contains(n)).ok_or_else(wrong)
 }
 
-/// The name of an instruction set that the machine has.
+/// Parses the name of an instruction set that the machine has.
 pub(super) fn level(text: &str) -> Result<Level, String> {
     text.parse().map_err(|e: UnknownLevel| e.to_string())
 }
 
-/// A linear colour as settings text that [`background`] reads back exactly.
+/// Formats a linear colour as text that [`background`] reads back exactly.
 pub(super) fn color_text(c: Vec3) -> String {
     format!("{},{},{}", c.x, c.y, c.z)
 }

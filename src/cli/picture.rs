@@ -1,5 +1,4 @@
-//! One picture: the settings that apply after command line, scene file and defaults are laid over each other, and its
-//! way into a file.
+//! One picture: its settings, combined from command line, scene file and defaults, and its encoding and writing.
 
 use super::interrupt;
 use super::job::{Look, Shot};
@@ -11,19 +10,19 @@ use crate::scene::features::is_unlit;
 use crate::scene::{Background, Environment, Scene};
 use std::io::{self, Write};
 
-/// What applies to one picture.
+/// Effective settings of one picture.
 #[derive(Clone, Debug)]
 pub(super) struct Effective {
-    /// For the renderer.
+    /// Settings for the renderer.
     pub settings: Settings,
-    /// For the encoder; its background is filled in when it is written.
+    /// Settings for the encoder; the background is filled in on writing.
     pub output: Output,
-    /// Whether nobody has said how bright the picture is to be: files of measured lamps are metered.
+    /// Whether no exposure was given: scenes with photometric lamps are then metered.
     pub metered: bool,
 }
 
 impl Effective {
-    /// The command line first, then the scene file, then the defaults.
+    /// Combines settings: the command line takes precedence over the scene file, and that over the defaults.
     pub(super) fn new(look: &Look, scene: &Scene) -> Result<Self, String> {
         let (usual, hints) = (Settings::default(), &scene.hints);
         let (width, height) = look.size.or(hints.size).unwrap_or((usual.width, usual.height));
@@ -58,23 +57,23 @@ impl Effective {
     }
 }
 
-/// The curve that was asked for, or that of the scene file; else the usual one, and none where nothing answers to light: curves
-/// make room for highlights, and what is unlit has none, and means its colours as they are.
+/// Requested tone curve, or that of the scene file. The default is none if all is unlit: curves make room for highlights, which
+/// unlit colours lack, and those are meant as they are.
 pub(super) fn tone_map(typed: Option<ToneMap>, scene: &Scene) -> Result<ToneMap, String> {
     let hinted = scene.hints.tone_map.as_deref().map(str::parse::<ToneMap>).transpose().map_err(|e| e.to_string())?;
     let usual = || if is_unlit(scene) { ToneMap::None } else { ToneMap::default() };
     Ok(typed.or(hinted).unwrap_or_else(usual))
 }
 
-/// How wide points or lines so narrow are, pixels, in a picture of a model about so large, both in world units.
+/// Width in pixels of points or lines of width `narrowest` in a picture of a model of about this `size`, both in world units.
 pub(super) fn wide_in_pixels(narrowest: f64, size: f64, settings: &Settings) -> f64 {
     narrowest / size * f64::from(settings.height.min(settings.width))
 }
 
 impl Effective {
-    /// Adapts the settings to the kind of file that a picture of a scene is written as: errors are counted in what it holds.
-    /// Measured lamps are shown by exposures of many stops; the walls of the studio, which stand for no place, are not to turn
-    /// black or white by them.
+    /// Adapts the settings to the file type of a picture: errors are measured in the values that it holds. Photometric lamps need
+    /// exposures of many stops; the studio's walls, which are no real place, are scaled so that these do not turn them black or
+    /// white.
     pub(super) fn written_as(&mut self, look: &Look, scene: &Scene, kind: FileKind) {
         if scene.photometric && kind != FileKind::Exr {
             self.settings.walls = libm::exp2f(-self.output.exposure);
@@ -82,29 +81,29 @@ impl Effective {
         self.settings.sampling = look.sampling.written(self.settings.sampling, kind, &self.output);
     }
 
-    /// Adapts the sampling to a model about so large that has points or lines so narrow, world units.
+    /// Adapts the sampling to points or lines of width `narrowest` in a model of about this `size`, both in world units.
     pub(super) fn of_wires(&mut self, look: &Look, narrowest: f64, size: f64) {
         let pixels = wide_in_pixels(narrowest, size, &self.settings);
         self.settings.sampling = look.sampling.of_wires(self.settings.sampling, pixels);
     }
 
-    /// Width / height.
+    /// Aspect ratio, width / height.
     pub(super) fn aspect(&self) -> f64 {
         f64::from(self.settings.width) / f64::from(self.settings.height)
     }
 
-    /// With or without the work that the scene does not need.
+    /// Sets whether to run code paths that the scene does not need.
     pub(super) fn without_pruning(mut self, no_prune: bool) -> Self {
         self.settings.no_prune = no_prune;
         self
     }
 }
 
-/// Behind a scene without environment when nobody says: about as dark as the studio's backdrop, so that neither black
-/// nor white things vanish before it.
+/// Default background of a scene without environment: about as dark as the studio's backdrop, so that neither black nor white
+/// things vanish before it.
 const BACKDROP: crate::math::Vec3 = crate::math::Vec3::splat(0.07);
 
-/// What is behind everything: as typed, as the file says, or what reflections see; dark grey where they see nothing.
+/// Background of a picture: as typed, or from the file, or the environment; dark grey if the environment is black.
 pub(super) fn background(typed: Option<Background>, scene: &Scene) -> Background {
     typed.or(scene.background).unwrap_or(match scene.environment {
         Environment::Black => Background::Color(BACKDROP),
@@ -112,7 +111,7 @@ pub(super) fn background(typed: Option<Background>, scene: &Scene) -> Background
     })
 }
 
-/// Writes pictures of a scene with that background.
+/// Output settings with that background, if it is a colour.
 pub(super) fn before(background: Option<Background>, mut output: Output) -> Output {
     if let Some(Background::Color(color)) = background {
         output.background = Some(color.to_array());
@@ -120,27 +119,27 @@ pub(super) fn before(background: Option<Background>, mut output: Output) -> Outp
     output
 }
 
-/// What is found out about a picture behind it.
+/// Additional data gathered for a picture.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Behind {
-    /// Costs of each pixel.
+    /// Number of costs per pixel.
     pub costs: usize,
-    /// Whether it is rendered once more, to count.
+    /// Whether the picture is rendered once more, to count.
     pub counted: bool,
 }
 
-/// Bytes that each ray of adaptive sampling takes until the picture is done, at most: what it has found, measured on three
-/// models, and what it tells layers, in lists that grow.
+/// Maximum number of bytes that each ray of adaptive sampling keeps until the picture is done: its results, measured on three
+/// models, and its data for layers, in growing lists.
 fn bytes_of_ray(settings: &Settings) -> u64 {
     224 + if settings.layers { 2 * 56 } else { 0 }
 }
 
-/// Rays that it sends through each pixel at least: a corner and a middle.
+/// Minimum number of rays per pixel of adaptive sampling: a corner and a centre.
 const FEWEST_RAYS: u64 = 2;
 
-/// Rays that a picture keeps at a time, at least: those of all pixels, and of the pixels that are sampled together also those of
-/// the parts into which each is halved in any case. Where there are several such bands, memory of one is not all there for the
-/// next (measured: half as much again is taken).
+/// Minimum number of rays that adaptive sampling keeps at a time: those of all pixels, and for the pixels sampled together (a
+/// band) also those of the parts into which each is always split. With several bands, the memory of one is not fully reusable for
+/// the next (measured: half as much again is taken).
 fn kept_rays(how: &Adaptive, (width, height): (u32, u32)) -> u64 {
     let (pixels, together) = (u64::from(width) * u64::from(height), pixels_at_a_time(width));
     let together = if together < pixels { together + together / 2 } else { pixels };
@@ -148,7 +147,7 @@ fn kept_rays(how: &Adaptive, (width, height): (u32, u32)) -> u64 {
     pixels * FEWEST_RAYS + together.saturating_mul(of_parts)
 }
 
-/// Bytes that the rays of a picture take beyond what [`bytes`] knows of, where so many are sent.
+/// Bytes that `rays` rays of a picture take beyond those included in [`bytes`].
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -160,22 +159,21 @@ pub(super) fn bytes_of_rays(settings: &Settings, rays: f64) -> u64 {
     (rays as u64).saturating_sub(known) * bytes_of_ray(settings)
 }
 
-/// The most memory that a picture takes on its way into such a file, bytes: all that is known of its pixels, a second time
-/// while it is counted or another is rendered beside it; then its samples as they are stored, and the file, which may
-/// hardly be smaller.
+/// Peak memory in bytes of a picture until it is in its file: all data of its pixels, twice while it is counted or another is
+/// rendered beside it; then the samples as stored, and the encoded file, which may be hardly smaller.
 pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: Behind) -> u64 {
-    /// Of the costs of a pixel: those of its tile, five channels, copies and sums.
+    /// Bytes per cost of a pixel: those of its tile, five channels, copies and sums.
     const COST: u64 = 128;
     let Effective { settings, output, .. } = effective;
     let pixels = u64::from(settings.width) * u64::from(settings.height);
-    // How many samples a pixel got, and how certain it is.
+    // Number of samples per pixel, and its uncertainty.
     let (sampled, rays) = match &settings.sampling {
         Sampling::Uniform => (0, 0),
         Sampling::Adaptive(how) => (4, kept_rays(how, (settings.width, settings.height))),
         Sampling::Stochastic(_) => (8, 0),
     };
     let in_layers = |bytes: u64| if settings.layers { bytes } else { 0 };
-    /// What comes through glass before a background, of which nothing is known yet.
+    /// Light through glass, stored before the background is known.
     const VEIL: u64 = 16;
     let known = 16 + VEIL + sampled + in_layers(48 + sampled);
     let stored = match kind {
@@ -183,26 +181,26 @@ pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: Behind) -> u6
             let color = if output.exr_samples == ExrSamples::Float { 4 } else { 2 };
             2 * (4 * color + in_layers(6 * color + 24 + sampled))
         }
-        // Its bytes are put into the order of the file first.
+        // The encoder first copies the samples into the byte order of the file.
         FileKind::Png if output.png_depth == PngDepth::Sixteen => 3 * 8,
         FileKind::Png | FileKind::Jpeg | FileKind::Webp => 2 * 4,
     };
-    // For a given error of the picture two are rendered side by side.
+    // With a target error, two pictures are rendered in parallel.
     let is_aimed = matches!(&settings.sampling, Sampling::Stochastic(how) if how.target.is_some());
     let again = if behind.counted || is_aimed { known } else { 0 };
     let of_pixels = pixels * (known + stored.max(again) + COST * behind.costs as u64);
     of_pixels.saturating_add(rays.saturating_mul(bytes_of_ray(settings)))
 }
 
-/// A fault when the picture alone needs more than the memory that is allowed.
+/// Returns a fault if the picture alone needs more memory than allowed.
 pub(super) fn too_large(effective: &Effective, kind: FileKind, behind: Behind, limit: u64) -> Option<Diagnostic> {
     let settings = &effective.settings;
     beyond((settings.width, settings.height), bytes(effective, kind, behind), limit)
 }
 
-/// A fault when judging a picture, of which only what its pixels cost is kept, takes more memory than is allowed.
+/// Returns a fault if judging a picture, of which only the costs per pixel are kept, needs more memory than allowed.
 pub(super) fn too_large_to_judge((width, height): (u32, u32), limit: u64) -> Option<Diagnostic> {
-    /// Light, counts, and both once more of what it is compared with.
+    /// Light, counts, and both again for the picture it is compared with.
     const OF_PIXEL: u64 = 64;
     beyond((width, height), u64::from(width) * u64::from(height) * OF_PIXEL, limit)
 }
@@ -219,26 +217,26 @@ fn beyond((width, height): (u32, u32), need: u64, limit: u64) -> Option<Diagnost
     Some(Diagnostic::new("picture-too-large", "", "", text).remedy(remedy))
 }
 
-/// Whether the system gives so much memory at once; nothing of it is touched. Where it does not, the program would be ended in
-/// the midst of its work.
+/// Whether the system grants this much memory at once; none of it is touched. Otherwise the process might be killed in the middle
+/// of its work.
 fn is_given(need: u64) -> bool {
-    /// Every system gives this much.
+    /// Granted by every system.
     const LITTLE: u64 = 1 << 30;
     let is_reserved = |need: usize| {
         let mut room = Vec::<u8>::new();
         let reserved = room.try_reserve_exact(need).is_ok();
-        // Else the compiler may do without it.
+        // Keeps the compiler from removing the allocation.
         std::hint::black_box(room);
         reserved
     };
     need <= LITTLE || usize::try_from(need).is_ok_and(is_reserved)
 }
 
-/// Why a picture was not written.
+/// Reason why a picture was not written.
 pub(super) enum WriteError {
-    /// Whoever read standard output has enough; that is no fault.
+    /// The reader closed standard output, which is no fault.
     BrokenPipe,
-    /// Anything else.
+    /// Any other reason.
     Fault(Diagnostic),
 }
 
@@ -249,7 +247,7 @@ impl WriteError {
     }
 }
 
-/// The bytes of the picture's file.
+/// Encodes the picture as the bytes of its file.
 pub(super) fn encoded(
     shot: &Shot,
     picture: &Picture,
@@ -261,7 +259,7 @@ pub(super) fn encoded(
     encode(picture, shot.kind, &output, metadata).map_err(|e| WriteError::new(shot, e.to_string()))
 }
 
-/// Puts the bytes where they belong.
+/// Writes the bytes to the picture's target.
 pub(super) fn write(shot: &Shot, bytes: &[u8]) -> Result<(), WriteError> {
     match &shot.target {
         Target::Stdout => {
@@ -337,7 +335,7 @@ mod tests {
             effective.settings.sampling = Sampling::Adaptive(Adaptive { min_levels, ..Adaptive::default() });
             bytes(&effective, FileKind::Png, Behind::default())
         };
-        // Measured: 6.5 GB, and 2.6 GB of four such bands.
+        // Measured: 6.5 GB, and 2.6 GB with four bands.
         assert!((6_000_000_000..9_000_000_000).contains(&of((256, 256), 4)), "{}", of((256, 256), 4));
         assert!((2_600_000_000..4_500_000_000).contains(&of((512, 512), 3)), "{}", of((512, 512), 3));
         assert!(of((3000, 3000), 1) < 6_000_000_000, "{}", of((3000, 3000), 1));

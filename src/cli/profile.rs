@@ -1,4 +1,4 @@
-//! `--profile`: where a picture's time went, stage by stage, on the wall and of the processors.
+//! `--profile`: time of a picture by stage, wall clock and CPU.
 
 use super::message::Messages;
 use crate::render::{self, CLASS_NAMES};
@@ -10,13 +10,13 @@ use std::time::Duration;
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
     name: &'static str,
-    /// Unknown of the parts of a stage whose threads work side by side.
+    /// Wall-clock time; `None` for parts of a stage whose threads run in parallel.
     wall: Option<Duration>,
     cpu: Duration,
     rays: Option<u64>,
 }
 
-/// The stages of one picture, in the order in which they were done.
+/// Stages of one picture, in order.
 #[derive(Clone, Debug)]
 pub(super) struct Profile {
     watch: Stopwatch,
@@ -24,24 +24,24 @@ pub(super) struct Profile {
 }
 
 impl Profile {
-    /// Nothing done yet; what the process has spent so far is told as `start`.
+    /// Empty profile; the CPU time of the process so far becomes the stage `start`.
     pub(super) fn of_process() -> Self {
         let start = Row { name: "start", wall: None, cpu: stopwatch::processor_since_start(), rays: None };
         Self { rows: vec![start], ..Self::new() }
     }
 
-    /// Nothing done yet.
+    /// Empty profile.
     pub(super) fn new() -> Self {
         Self { watch: Stopwatch::of_all_threads(), rows: Vec::new() }
     }
 
-    /// A stage ends here: it began where the one before ended. Called again, it goes on.
+    /// Ends a stage that began where the previous one ended. Repeated names accumulate.
     pub(super) fn done(&mut self, name: &'static str) {
         let spent = self.watch.lap();
         self.add(name, spent);
     }
 
-    /// The loading of a model ends here, of which these parts are known.
+    /// Ends the loading of a model, with the times of its known parts.
     pub(super) fn loaded(&mut self, reading: Spent, decoding: Spent) {
         let all = self.watch.lap();
         self.add("read", reading);
@@ -51,7 +51,7 @@ impl Profile {
         }
     }
 
-    /// The rendering ends here; `parts` are known when it was profiled.
+    /// Ends the rendering, with the times of its parts if it was profiled.
     pub(super) fn rendered(&mut self, parts: &render::Profile) {
         self.watch.lap();
         self.add("prepare", parts.prepare);
@@ -64,12 +64,12 @@ impl Profile {
         self.rows.push(Row { name: "shade", wall: None, cpu: parts.shade(), rays: None });
     }
 
-    /// Leaves out what was done since the last stage.
+    /// Discards the time since the last stage.
     pub(super) fn skip(&mut self) {
         self.watch.lap();
     }
 
-    /// What has been told so far; this one goes on with nothing.
+    /// Returns the profile so far, and starts an empty one.
     pub(super) fn take(&mut self) -> Self {
         std::mem::replace(self, Self::new())
     }
@@ -84,7 +84,7 @@ impl Profile {
         }
     }
 
-    /// Whether a row is a part of the one before it that is none.
+    /// Whether a row is part of the last whole stage before it.
     fn is_part(row: &Row) -> bool {
         row.name == "shade" || CLASS_NAMES.contains(&row.name)
     }
@@ -94,14 +94,14 @@ impl Profile {
         whole.map(|row| Spent { wall: row.wall.unwrap_or_default(), cpu: row.cpu }).sum()
     }
 
-    /// A table, one message a line.
+    /// Writes the profile as a table, one message per line.
     pub(super) fn say(&self, messages: &Messages) {
         self.lines(stopwatch::peak_memory()).into_iter().for_each(|line| messages.info("profile", line));
     }
 
     fn lines(&self, peak: Option<u64>) -> Vec<String> {
         let total = self.total();
-        // Where nobody tells what the processors do, nothing is a share of it.
+        // Without CPU times there are no shares.
         let share = |cpu: Duration| if total.cpu.is_zero() { 0.0 } else { 100.0 * cpu.div_duration_f64(total.cpu) };
         let line = |name: &str, wall: Option<Duration>, cpu: Duration, note: &str| {
             let wall = wall.map(milliseconds).unwrap_or_default();
@@ -119,7 +119,7 @@ impl Profile {
         lines
     }
 
-    /// For `--stats json`.
+    /// JSON for `--stats json`.
     pub(super) fn json(&self) -> Value {
         let row = |row: &Row| {
             let wall = row.wall.map(|wall| wall.as_secs_f64());

@@ -1,8 +1,6 @@
-//! What the user sees while waiting: a bar on a terminal, a plain line every few seconds elsewhere, nothing with
-//! `--quiet`.
+//! Progress display: a bar on a terminal, a plain line every few seconds elsewhere, nothing with `--quiet`.
 //!
-//! The bar runs over load → build → render, or over the parts of what is measured. Only work of known length has a time
-//! to go.
+//! The bar covers load → build → render, or the parts of a measurement. Only work of known length has an estimated time left.
 
 use super::interrupt;
 use super::message::Messages;
@@ -10,16 +8,16 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Lines that are not a terminal's come this far apart.
+/// Interval of progress lines if stderr is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
-/// From a shorter time nothing is said of what is left.
+/// Minimum elapsed time before the time left is estimated.
 const TELLING: Duration = Duration::from_secs(1);
 
-/// The progress of one picture.
+/// Progress of one picture.
 pub(super) struct Progress<'a> {
     how: How<'a>,
-    /// Whether a signal ends the render so that its tiles can be kept.
+    /// Whether a signal ends the render, so that its tiles can be kept.
     cancellable: bool,
 }
 
@@ -56,7 +54,7 @@ impl<'a> Progress<'a> {
         Self { how, cancellable }
     }
 
-    /// A stage of unknown length begins: `loading`, `building`.
+    /// Begins a stage of unknown length: `loading`, `building`.
     pub(super) fn stage(&self, what: &str) {
         match &self.how {
             How::Silent => {}
@@ -69,7 +67,7 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// Work of known length begins: `rendering`, `judging`; [`Self::advance`] tells how far it is.
+    /// Begins work of known length: `rendering`, `judging`; [`Self::advance`] reports its progress.
     pub(super) fn begin(&self, doing: &'static str) {
         match &self.how {
             How::Silent => {}
@@ -88,7 +86,7 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// Work of unknown length goes on.
+    /// Reports that work of unknown length continues.
     fn goes_on(&self, doing: &'static str) {
         match &self.how {
             How::Silent => {}
@@ -108,19 +106,19 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// So many of `total` parts are done.
+    /// Reports that `done` of `total` parts are done.
     pub(super) fn advance(&self, done: usize, total: usize) {
         match &self.how {
             How::Silent => {}
             How::Bar { bar, .. } => {
                 bar.set_length(total as u64);
-                // Workers report out of order; the bar never goes back.
+                // Workers report out of order; the bar never moves back.
                 if done as u64 > bar.position() {
                     bar.set_position(done as u64);
                 }
             }
             How::Lines { name, messages, stage } => {
-                // Whoever finds another worker writing has nothing to add.
+                // If another worker is writing, there is nothing to add.
                 let Ok(mut stage) = stage.try_lock() else { return };
                 let elapsed = stage.started.elapsed();
                 if stage.last_line.elapsed() >= LINE_EVERY && elapsed >= TELLING && done < total {
@@ -131,7 +129,7 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// Nothing more to show.
+    /// Removes the display.
     pub(super) fn finish(&self) {
         if let How::Bar { bar, messages } = &self.how {
             bar.finish_and_clear();

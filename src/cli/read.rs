@@ -1,4 +1,4 @@
-//! Inputs -> one scene, from files or standard input.
+//! Loads inputs, from files or standard input, into one scene.
 
 use super::args::{LoadArgs, ModelArgs};
 use super::exit::Exit;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::slice;
 use xxhash_rust::xxh3::xxh3_128;
 
-/// Loads every input and puts all into the first one's scene, in the memory that is allowed for all together.
+/// Loads all inputs and appends them to the first one's scene, within the memory limit for all together.
 pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded, LoadError> {
     let (first, others) = match inputs {
         [] => return Ok(Loaded::default()),
@@ -33,18 +33,18 @@ pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded,
     Ok(whole)
 }
 
-/// What is left of the memory that may be taken beside a model that was loaded.
+/// Limits that remain beside a loaded model.
 pub(super) fn left(limits: &Limits, loaded: &Loaded) -> Limits {
     beside(limits, loaded.facts.kept)
 }
 
-/// What is left of the memory that may be taken beside so many bytes.
+/// Limits that remain beside `bytes` bytes.
 pub(super) fn beside(limits: &Limits, bytes: u64) -> Limits {
     let memory = limits.memory.saturating_sub(bytes);
     Limits { memory, file: limits.file.min(memory), ..*limits }
 }
 
-/// Loads one model and says what there is to warn of; a failure is said too.
+/// Loads one model and reports its warnings; a failure is reported too. Refuses scenes that cannot be flattened.
 pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exit> {
     let ModelArgs { input, load, .. } = args;
     let loaded = model_as_stored(input, load, messages)?;
@@ -52,7 +52,7 @@ pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exi
     Ok(loaded)
 }
 
-/// Loads a model for a command that does not need each instance by itself.
+/// Loads a model for a command that does not need flattened instances.
 pub(super) fn model_as_stored(input: &PathBuf, args: &LoadArgs, messages: &Messages) -> Result<Loaded, Exit> {
     let moment = moment::moment(&args.moment).map_err(|wrong| messages.wrong(wrong))?;
     let options = LoadOptions { moment, ..args.options() };
@@ -61,14 +61,13 @@ pub(super) fn model_as_stored(input: &PathBuf, args: &LoadArgs, messages: &Messa
     Ok(loaded)
 }
 
-/// Refuses a scene whose instances, each stored by itself, take more memory than is allowed: a small file can name
-/// millions of them.
+/// Refuses a scene whose flattened instances take more memory than allowed: a small file can name millions of them.
 pub(super) fn check_flattened(loaded: &Loaded, limit: u64, file: &Path) -> Result<(), Diagnostic> {
     let bytes = World::flattened_bytes(&loaded.scene);
     check_stored((loaded, bytes), limit, file, "raise --max-memory")
 }
 
-/// Refuses a scene whose stored instances, all of them or some, take more bytes than are allowed.
+/// Refuses a scene whose stored instances take more bytes than allowed.
 pub(super) fn check_stored(
     (loaded, bytes): (&Loaded, u64),
     limit: u64,
@@ -85,8 +84,7 @@ pub(super) fn check_stored(
     Err(Diagnostic::new("instances-too-large", file, "", text).remedy(remedy))
 }
 
-/// Stores a scene as is wanted, or, where the instances that are then stored by themselves take more memory than is allowed,
-/// in the other way.
+/// Stores a scene in the `wanted` way, or in the `other` way if its flattened instances would exceed the memory limit.
 pub(super) fn placed(
     loaded: &Loaded,
     (wanted, other): (Instancing, Instancing),
@@ -103,7 +101,7 @@ pub(super) fn placed(
     Ok(otherwise.world())
 }
 
-/// Stores a scene as a picture of it does: its instances are kept, too, where nothing else fits.
+/// Stores a scene as for rendering it: instances are kept also where nothing else fits, unless flattening is requested.
 pub(super) fn as_drawn(loaded: &Loaded, how: Instancing, limit: u64, file: &Path) -> Result<World, Diagnostic> {
     let (other, remedy) = match how {
         Instancing::Flatten => (
@@ -115,15 +113,15 @@ pub(super) fn as_drawn(loaded: &Loaded, how: Instancing, limit: u64, file: &Path
     placed(loaded, (how, other), limit, file, remedy)
 }
 
-/// Why a model with warnings is not rendered where they are errors.
+/// Fault of a model with warnings that is not rendered because of `--strict`.
 pub(super) fn not_strict(count: usize, file: &Path) -> Diagnostic {
     let kinds = if count == 1 { "is a warning".into() } else { format!("are {count} kinds of warnings") };
     Diagnostic::new("strict", file, "", format!("not rendered: --strict, and there {kinds}"))
         .remedy("mend what they tell of, or leave out --strict")
 }
 
-/// Gives a frame that was loaded without pictures those of an earlier one, which are the same, with the materials that
-/// show them. Whether it can be done: other materials are a sign that the file has been changed in between.
+/// Gives a frame that was loaded without pictures those of an earlier one, with the materials that show them. Returns false if
+/// the materials differ, a sign that the file has changed in between.
 pub(super) fn take_pictures(frame: &mut Loaded, earlier: Loaded) -> bool {
     let names =
         |loaded: &Loaded| loaded.scene.materials.iter().map(|material| material.name.clone()).collect::<Vec<_>>();
@@ -178,7 +176,7 @@ mod tests {
     use super::*;
     use std::fmt::Write;
 
-    /// Triangles of an OBJ: its text and its tables take far more than what is made of them.
+    /// OBJ text of triangles: parsing it takes far more memory than the resulting mesh.
     fn model() -> String {
         let mut text = String::new();
         for i in 0..20_000 {
@@ -199,7 +197,7 @@ mod tests {
             let limits = Limits { memory, file: memory, ..Limits::default() };
             scene(inputs, &LoadOptions { limits, ..LoadOptions::default() })
         };
-        // The least memory, to some kilobytes, that one of them needs.
+        // Least memory, to 4 KiB, that one of them needs.
         let (mut less, mut enough) = (0, 1 << 30);
         while enough - less > 4096 {
             let middle = (less + enough) / 2;

@@ -1,4 +1,4 @@
-//! `meshray render`: one batch after the other, going on where one fails; load, then every picture of what was loaded.
+//! `meshray render`: one batch after the other, continuing after failures; loads a scene, then renders all its pictures.
 
 use super::exit::Exit;
 use super::job::{Batch, RenderJob, Shot};
@@ -25,7 +25,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Does the whole job and tells how it ended: as its worst picture.
+/// Runs the whole job; the exit code is that of its worst picture.
 pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
     let pool = match threads::pool(job.threads) {
         Ok(pool) => pool,
@@ -37,7 +37,7 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
     huge_pages::allow(for_large_pages(job));
     let sources = Sources::of(job.batches.iter().flat_map(|b| &b.inputs));
     let mut run_state = RunState::new(sources);
-    // A picture that is repeated may be replaced by its repetition, but by nothing else.
+    // A repeated picture may be replaced by its repetition, but by nothing else.
     let spared = |path| Sources::of(&job.again).spared_by(path, "--stats-file");
     if let Some(path) = job.stats_file() {
         let growth = outputs::grows_with(&job.batches, path).filter(|growth| !growth.is_dir());
@@ -71,26 +71,26 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
     worst.max(report(job, &run_state, messages))
 }
 
-/// What a run has read and made so far.
+/// State of a run: what has been read and rendered so far.
 pub(super) struct RunState {
-    /// Whether a frame of the sequence that is rendered shows something.
+    /// Whether a frame of the current sequence shows something.
     pub shown: bool,
-    /// Folders that are not there, and that this was said of.
+    /// Missing folders that have been reported.
     pub missing: HashSet<PathBuf>,
-    /// Files and views whose pictures show nothing, and that this was said of.
+    /// Files and views whose empty pictures have been reported.
     pub warned_empty: HashSet<(PathBuf, String)>,
-    /// All inputs, and the files that those loaded so far use.
+    /// All inputs, and the files used by those loaded so far.
     pub sources: Sources,
-    /// How many pictures were left alone, as they are up to date.
+    /// Number of pictures skipped as up to date.
     pub up_to_date: u64,
-    /// Statistics of each.
+    /// Statistics of each picture.
     pub pictures: Vec<PictureStats>,
-    /// What was foretold of each, where that goes to a file.
+    /// Forecast of each picture, if forecasts go to a file.
     pub foretold: Vec<String>,
 }
 
 impl RunState {
-    /// Nothing yet.
+    /// Initial state.
     fn new(sources: Sources) -> Self {
         Self {
             shown: false,
@@ -103,12 +103,12 @@ impl RunState {
         }
     }
 
-    /// The state of one input among others that are rendered beside it.
+    /// State of one input that is rendered in parallel with others.
     pub(super) fn of_one(&self) -> Self {
         Self::new(self.sources.clone())
     }
 
-    /// Adds what came of an input that was rendered beside others.
+    /// Merges the state of an input that was rendered in parallel with others.
     pub(super) fn add(&mut self, one: Self) {
         self.up_to_date += one.up_to_date;
         self.pictures.extend(one.pictures);
@@ -117,11 +117,11 @@ impl RunState {
     }
 }
 
-/// What large pages may take that are dear: about a hundredth of what the pictures will.
+/// Time that costly huge pages may take: about a hundredth of the estimated time of the pictures.
 fn for_large_pages(job: &RenderJob) -> Duration {
-    /// Nanoseconds; a sample takes some hundreds.
+    /// Nanoseconds per sample; a sample itself takes some hundreds.
     const OF_SAMPLE: u64 = 3;
-    /// Samples of a pixel where errors decide; most need fewer.
+    /// Estimated samples per pixel with stochastic sampling; most pixels need fewer.
     const SAMPLES: u32 = 8;
     let Ok(Effective { settings, .. }) = Effective::new(&job.look, &Scene::default()) else {
         return Duration::MAX;
@@ -135,7 +135,7 @@ fn for_large_pages(job: &RenderJob) -> Duration {
     Duration::from_nanos([pictures, u64::from(samples), OF_SAMPLE].into_iter().fold(pixels, u64::saturating_mul))
 }
 
-/// Prints or writes the statistics, if there are any, but never over what a model was read from.
+/// Prints or writes the statistics, if any, but never over a file that a model was read from.
 fn report(job: &RenderJob, run_state: &RunState, messages: &Messages) -> Exit {
     let text = if job.dry_run { run_state.foretold.concat() } else { stats::text(job, &run_state.pictures) };
     if text.is_empty() {
@@ -143,12 +143,12 @@ fn report(job: &RenderJob, run_state: &RunState, messages: &Messages) -> Exit {
     }
     match job.stats_file().map_or(Ok(()), |path| run_state.sources.spared_by(path, "--stats-file")) {
         Ok(()) => stats::report(job, &text, messages),
-        // It was said when that model was loaded.
+        // The conflict was reported when that model was loaded.
         Err(_) => Exit::Failed,
     }
 }
 
-/// The pictures of a scene that may be written where they go, and how the command ends because of the others.
+/// Pictures of a scene whose targets may be written, and the exit caused by the others.
 pub(super) fn writable_shots<'a>(
     job: &RenderJob,
     batch: &'a Batch,
@@ -158,14 +158,14 @@ pub(super) fn writable_shots<'a>(
     let mut worst = Exit::Done;
     let mut shots = Vec::new();
     for shot in &batch.shots {
-        // What is only foretold goes nowhere.
+        // Forecasts write no picture to standard output.
         let goes = |target: &Target| !job.dry_run || target.path().is_some();
         let mut targets = outputs::of(shot, job.beside()).into_iter().filter(goes);
         let growth = shot.growth.as_deref();
         match targets.try_for_each(|target| writable::check_target(&target, growth, &run_state.sources)) {
             Ok(()) => shots.push(shot),
             Err(fault) => {
-                // Of pictures for a folder that is not there, one says so.
+                // A missing folder is reported for only one of its pictures.
                 let goal = destination(&fault.file);
                 let folder = goal.parent().filter(|_| fault.code == writable::NO_FOLDER);
                 if folder.is_none_or(|folder| run_state.missing.insert(folder.to_path_buf())) {
@@ -178,7 +178,7 @@ pub(super) fn writable_shots<'a>(
     (shots, worst)
 }
 
-/// One scene and these of its pictures.
+/// Renders the given pictures of one scene, except those up to date.
 pub(super) fn render_batch(
     job: &RenderJob,
     batch: &Batch,
@@ -191,7 +191,7 @@ pub(super) fn render_batch(
         old.retain(|shot| match up_to_date::up_to_date(job, batch, shot) {
             None => true,
             Some(files) => {
-                // Other pictures must not replace them, either.
+                // Other pictures must not replace the files of skipped ones, either.
                 run_state.sources.add(files);
                 run_state.up_to_date += 1;
                 false
@@ -201,14 +201,14 @@ pub(super) fn render_batch(
     if old.is_empty() {
         return Exit::Done;
     }
-    // The bar needs the room that folders would take.
+    // Only the file name: the bar needs the room that its folders would take.
     let name = batch.inputs[0].file_name().unwrap_or(batch.inputs[0].as_os_str()).to_string_lossy();
     let progress = Progress::new(&name, messages, job.quiet || messages.are_kept(), job.keep_partial);
     let task = Task { job, batch, messages, progress: &progress };
     render_shots(&task, &old, run_state).unwrap_or_else(|exit| exit)
 }
 
-/// The pictures of one scene; the error is how it ended when not all of them could be tried.
+/// Renders the pictures of one scene; an error is the exit when not all of them could be tried.
 fn render_shots(task: &Task, shots: &[&Shot], run_state: &mut RunState) -> Result<Exit, Exit> {
     let Task { job, batch, messages, progress } = *task;
     let mut profile = if run_state.pictures.is_empty() { Profile::of_process() } else { Profile::new() };
@@ -220,7 +220,7 @@ fn render_shots(task: &Task, shots: &[&Shot], run_state: &mut RunState) -> Resul
     let mut earlier = beginning(task, shots, survey.as_ref(), &mut profile)?;
     let (mut worst, mut left) = (Exit::Done, shots);
     while let Some(first) = left.first() {
-        // Pictures of one moment have one scene.
+        // Pictures of the same moment share one scene.
         let same = left.iter().take_while(|shot| shot.step.moment == first.step.moment).count();
         let (now, later) = left.split_at(same);
         left = later;
@@ -256,8 +256,8 @@ fn render_shots(task: &Task, shots: &[&Shot], run_state: &mut RunState) -> Resul
     Ok(worst)
 }
 
-/// The moment of an animation by which all its pictures are exposed, its views metered: the first that shows something lit,
-/// of all, whichever of them are rendered. `None` where they are not exposed by any.
+/// Scene at the moment of an animation that determines the exposure of all its pictures, with its views metered: the first moment
+/// that shows something lit, among all frames, even those not rendered. `None` if nothing is metered.
 fn beginning(
     task: &Task,
     shots: &[&Shot],
@@ -288,21 +288,21 @@ fn beginning(
     Ok(earlier)
 }
 
-/// A scene that can be rendered.
+/// A loaded scene, ready to be rendered.
 struct Ready {
     loaded: Loaded,
     world: World,
     bounds: Bounds,
     load_seconds: f64,
-    /// Stages that no picture has told yet.
+    /// Stages that no picture has reported yet.
     profile: Profile,
     metered: Metered,
-    /// Code and place of the warnings that have been said.
+    /// Warnings that have been reported.
     told: HashSet<Kind>,
 }
 
 impl Ready {
-    /// Nothing built yet. Frames of a sequence are seen in the bounds of all.
+    /// Stage without a structure. Frames of a sequence are seen in the bounds of all frames.
     fn stage<'a>(&'a mut self, survey: Option<&'a Survey>) -> Stage<'a> {
         let Self { loaded, world, bounds, load_seconds, profile, metered, .. } = self;
         let bounds = survey.map_or(&*bounds, |survey| &survey.bounds);
@@ -310,7 +310,7 @@ impl Ready {
     }
 }
 
-/// What a warning is about, whatever the numbers in it: its code, file, place and words.
+/// Identity of a warning apart from its numbers: code, file, place and words.
 type Kind = (&'static str, PathBuf, String, String);
 
 fn kind_of(warning: &Diagnostic) -> Kind {
@@ -318,7 +318,7 @@ fn kind_of(warning: &Diagnostic) -> Kind {
     (warning.code, warning.file.clone(), warning.place.clone(), words)
 }
 
-/// Loads the inputs of a picture in the memory that the panorama of `--env` leaves, or else without that.
+/// Loads the inputs of a picture in the memory left by the `--env` panorama; if that fails, drops the panorama and tries again.
 fn load(job: &RenderJob, batch: &Batch, options: LoadOptions) -> Result<Loaded, LoadError> {
     let (env, limits) = (&job.look.env_read, options.limits);
     let kept = env.kept();
@@ -331,7 +331,7 @@ fn load(job: &RenderJob, batch: &Batch, options: LoadOptions) -> Result<Loaded, 
     }
 }
 
-/// Loads a scene for a picture, and refuses what cannot or must not be drawn. A frame of several may show nothing.
+/// Loads a scene for a picture, and refuses what cannot or must not be drawn. A frame of a sequence may be empty.
 fn prepare(
     task: &Task,
     (step, survey): (&Step, Option<&Survey>),
@@ -342,7 +342,7 @@ fn prepare(
     let start = Instant::now();
     progress.stage("loading");
     let options = survey.map_or_else(|| job.load_for(step), |survey| survey.load_for(job, step));
-    // Pictures are those of an earlier frame, unless other moments may show others.
+    // Image data is taken from an earlier frame, unless materials change over time.
     let has_pictures = earlier.as_ref().is_some_and(|earlier| !earlier.loaded.facts.changes_materials);
     let options = LoadOptions { without_pictures: has_pictures, ..options };
     let mut loaded = load(job, batch, options).map_err(|error| messages.load_error(&error))?;
@@ -362,7 +362,7 @@ fn prepare(
         surroundings::place(&job.look, &job.load.limits, &mut loaded).map_err(|error| messages.load_error(&error))?;
     }
     profile.loaded(loaded.facts.reading, loaded.facts.decoding);
-    // What is wrong with one frame is wrong with most, in other numbers.
+    // Faults of one frame mostly recur in others, with other numbers.
     let mut warn = |warnings: &[Diagnostic]| {
         for warning in warnings {
             if told.insert(kind_of(warning)) || !is_later {
@@ -393,9 +393,9 @@ fn prepare(
     Ok(Ready { loaded, world, bounds, load_seconds, profile, metered, told })
 }
 
-/// What stands too far from the middle of the scene to be drawn as it is.
+/// Warning about an object too far from the middle of the scene to be drawn accurately.
 fn coarse(loaded: &Loaded, world: &World, file: &Path) -> Option<Diagnostic> {
-    /// Part of an object's size that its corners may be off by.
+    /// Tolerated error of an object's corners, relative to its size.
     const MOST: f64 = 0.01;
     let (which, part) = world.coarsest(&loaded.scene, MOST)?;
     let scene = &loaded.scene;

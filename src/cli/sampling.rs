@@ -1,4 +1,4 @@
-//! The flags of pixel sampling and of the lens: what was typed, what it means together, and how it is stored in a picture.
+//! Flags of pixel sampling and of the lens: arguments, their joint meaning, and their storage in a picture.
 
 use super::args::SpaceArg;
 use super::job::UsageError;
@@ -95,7 +95,7 @@ pub(super) struct SamplingArgs {
     pub focus: Option<Focus>,
 }
 
-/// Samples of a pixel at most where the error of the whole picture is asked for.
+/// Maximum number of samples per pixel with a target error of the whole picture.
 const MOST_TO_TARGET: u32 = 1 << 14;
 
 /// `--aa`.
@@ -107,16 +107,16 @@ pub(super) enum Aa {
     Stochastic,
 }
 
-/// Samples that a pixel gets at least through an open lens: what is out of focus shows in a few rays of many pixels, and that
-/// one ray of each shows the same tells nothing.
+/// Minimum number of samples per pixel with an open lens: defocused objects show in only few rays of many pixels, so that
+/// neighbouring single rays that agree prove nothing.
 const FEWEST_OF_LENS: u32 = 16;
 
-/// Samples of a pixel at least where points and lines are narrower than so many pixels: one ray in each may pass them all.
+/// Minimum number of samples per pixel for points and lines narrower than [`NARROW`] pixels: one ray per pixel may miss them all.
 const FEWEST_OF_WIRES: u32 = 16;
 const NARROW: f64 = 2.0;
 
 impl SamplingArgs {
-    /// Refuses flags that belong to different kinds of sampling.
+    /// Refuses combinations of flags of different kinds of sampling.
     pub(super) fn check(&self) -> Result<(), UsageError> {
         let (stochastic, adaptive) = (self.stochastic_flags(), self.adaptive_flags());
         let uniform = [("--samples", self.samples.is_some())];
@@ -151,8 +151,8 @@ impl SamplingArgs {
         Ok(())
     }
 
-    /// Refuses a limit on the samples of a pixel where the error of the picture says how many there are. What a picture carries
-    /// to be repeated has both.
+    /// Refuses a limit on the samples per pixel together with a target error of the picture, which determines their number. The
+    /// stored settings of a picture have both.
     pub(super) fn check_target(&self) -> Result<(), UsageError> {
         if self.target_error.is_none() || self.max_samples.is_none() {
             return Ok(());
@@ -162,7 +162,7 @@ impl SamplingArgs {
         Err(UsageError(text.into()))
     }
 
-    /// Flags of stochastic sampling alone, and whether they were typed.
+    /// Flags that only stochastic sampling uses, and whether they were typed.
     fn stochastic_flags(&self) -> [(&'static str, bool); 7] {
         [
             ("--quality", self.quality.is_some()),
@@ -175,7 +175,7 @@ impl SamplingArgs {
         ]
     }
 
-    /// Flags of adaptive sampling alone.
+    /// Flags that only adaptive sampling uses, and whether they were typed.
     fn adaptive_flags(&self) -> [(&'static str, bool); 4] {
         [
             ("--aa-split", self.aa_split.is_some()),
@@ -185,7 +185,7 @@ impl SamplingArgs {
         ]
     }
 
-    /// The kind of sampling: as typed, as other flags or the scene file have it, or stochastic.
+    /// Kind of sampling: as typed, or implied by other flags or by the scene file, or else stochastic.
     fn kind(&self, hints: &RenderHints) -> Aa {
         let typed = |flags: &[(&str, bool)]| flags.iter().any(|(_, typed)| *typed);
         let tuned = typed(&self.stochastic_flags()) || self.error_space.is_some();
@@ -198,8 +198,8 @@ impl SamplingArgs {
         })
     }
 
-    /// The samples of uniform sampling, and which rays pixels get. Errors are counted in what is said here;
-    /// [`Self::written`] says what that is for one picture.
+    /// Number of samples of uniform sampling, and the sampling itself. Its error space is a default; [`Self::written`] sets it
+    /// for a picture.
     pub(super) fn sampling(&self, hints: &RenderHints) -> (u32, Sampling) {
         let usual = Settings::default().samples;
         let samples = self.samples.or(hints.samples).unwrap_or(usual);
@@ -234,7 +234,7 @@ impl SamplingArgs {
         }
     }
 
-    /// How a picture of points and lines about so many pixels wide is sampled.
+    /// Sampling for a picture of points and lines about `pixels` pixels wide.
     pub(super) fn of_wires(&self, sampling: Sampling, pixels: f64) -> Sampling {
         match sampling {
             Sampling::Stochastic(how) if self.min_samples.is_none() => {
@@ -245,7 +245,7 @@ impl SamplingArgs {
         }
     }
 
-    /// How a picture that is written as this kind of file, developed like that, is sampled.
+    /// Sampling with the error space of a picture that is developed by `output` and written as this file type.
     pub(super) fn written(&self, sampling: Sampling, kind: FileKind, output: &Output) -> Sampling {
         let linear = match self.error_space {
             Some(space) => space == SpaceArg::Linear,
@@ -260,7 +260,7 @@ impl SamplingArgs {
         }
     }
 
-    /// The lens in front of this eye; `middle` is that of the model.
+    /// Lens of this camera; `middle` is the middle of the model.
     pub(super) fn lens(&self, view: &View, middle: DVec3, file: &Path) -> Result<Option<ThinLens>, Diagnostic> {
         let Some(radius) = self.aperture.filter(|&radius| radius > 0.0) else { return Ok(None) };
         let depth = |point: DVec3| (point - view.eye).dot(view.forward);
@@ -277,17 +277,17 @@ impl SamplingArgs {
     }
 }
 
-/// The fewest samples of a pixel that points and lines about so many pixels wide need.
+/// Minimum number of samples per pixel for points and lines about `pixels` pixels wide.
 pub(super) fn fewest_of_wires(pixels: f64) -> u32 {
     if pixels < NARROW { FEWEST_OF_WIRES } else { 1 }
 }
 
-/// What `--error-space` is called.
+/// Value of `--error-space`.
 fn space(space: ErrorSpace) -> &'static str {
     if space == ErrorSpace::Linear { "linear" } else { "display" }
 }
 
-/// The flags that repeat the sampling of a picture.
+/// Sets the flags that repeat the sampling of a picture.
 pub(super) fn flags(settings: &Settings, mut set: impl FnMut(&str, String)) {
     match settings.sampling {
         Sampling::Uniform => {
@@ -321,7 +321,7 @@ pub(super) fn flags(settings: &Settings, mut set: impl FnMut(&str, String)) {
     }
 }
 
-/// How the picture was sampled, in words.
+/// Describes how the picture was sampled.
 pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
     if let Some(to) = sampled.targeted {
         let at_most = if to.estimate.is_none() { "at most " } else { "" };
@@ -358,12 +358,12 @@ pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
     }
 }
 
-/// The number as it was typed, not as its nearest `f32` looks in `f64`.
+/// The number as typed, not the `f64` expansion of its nearest `f32`.
 pub(super) fn plain(x: f32) -> f64 {
     x.to_string().parse().unwrap_or_else(|_| x.into())
 }
 
-/// How pixels were sampled, for programs: as [`phrase`] tells it.
+/// Sampling of a picture as JSON, with the facts of [`phrase`].
 pub(super) fn json(settings: &Settings, sampled: &Sampled) -> Value {
     let rays = json!({
         "rays": sampled.rays, "mean": sampled.mean(), "samples_a_pixel": sampled.samples(), "most": sampled.most(),

@@ -1,6 +1,6 @@
-//! Pictures that belong together: the frames of an animation, and those from around a model.
+//! Sequences of pictures: frames of an animation, and turntables around a model.
 //!
-//! Both have one camera: it has every frame in the picture, or all of the model from everywhere on its way.
+//! All pictures of a sequence share one camera, which covers all frames, or the model from all around.
 
 use super::args::RenderArgs;
 use super::camera::{self, Choice, Shown};
@@ -17,32 +17,32 @@ use crate::scene::{Camera, Scene};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-/// What the pictures of a scene have in common.
+/// A sequence of pictures of one scene.
 #[derive(Clone, Debug)]
 pub(super) enum Sequence {
     /// Moments of an animation.
     Frames {
-        /// Their numbers.
+        /// Frame numbers.
         frames: Frames,
-        /// How many go by in a second.
+        /// Frames per second.
         fps: f64,
-        /// The animation: a name or number; `None`: the first.
+        /// Animation, by name or index; `None`: the first.
         animation: Option<String>,
     },
-    /// The camera goes around.
+    /// Views from all around the model.
     Turntable(Turns),
 }
 
-/// One picture's part of a sequence.
+/// Position of a picture in a sequence.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Step {
-    /// Number in the sequence; `None`: a picture by itself.
+    /// Number in the sequence; `None` for a single picture.
     pub number: Option<u32>,
-    /// What it shows of an animation; `None`: the rest pose.
+    /// Moment of an animation; `None`: the rest pose.
     pub moment: Option<Moment>,
 }
 
-/// The sequence that was typed.
+/// Requested sequence.
 pub(super) fn of(args: &RenderArgs) -> Result<Option<Sequence>, UsageError> {
     let Some(frames) = args.frames else { return Ok(args.turntable.map(Sequence::Turntable)) };
     if let Some(frame) = args.load.moment.frame.filter(|frame| !(frames.first..frames.end).contains(frame)) {
@@ -59,7 +59,7 @@ pub(super) fn of(args: &RenderArgs) -> Result<Option<Sequence>, UsageError> {
     Ok(Some(Sequence::Frames { frames, fps: moment::fps(&args.load.moment), animation }))
 }
 
-/// The pictures of each view, in order.
+/// Steps of the pictures of each view, in order.
 pub(super) fn steps(args: &RenderArgs, sequence: Option<&Sequence>) -> Result<Vec<Step>, UsageError> {
     Ok(match sequence {
         Some(whole @ Sequence::Frames { frames, .. }) => {
@@ -76,14 +76,14 @@ pub(super) fn steps(args: &RenderArgs, sequence: Option<&Sequence>) -> Result<Ve
 }
 
 impl Turns {
-    /// How far around a picture is, radians.
+    /// Angle of a turntable picture, in radians.
     pub(super) fn angle(self, number: u32) -> f64 {
         TAU * f64::from(number) / f64::from(self.count)
     }
 }
 
 impl Sequence {
-    /// What a frame shows; `None`: the moment is the same for all.
+    /// Moment of a frame; `None` for a turntable, whose pictures share one moment.
     fn moment(&self, frame: u32) -> Option<Moment> {
         match self {
             Self::Frames { fps, animation, .. } => {
@@ -95,7 +95,7 @@ impl Sequence {
 }
 
 impl RenderJob {
-    /// That with which the sequence of a picture begins; a picture by itself is its own.
+    /// First step of a picture's sequence; a single picture is its own.
     pub(super) fn first_step(&self, step: &Step) -> Step {
         match &self.sequence {
             Some(Sequence::Frames { .. }) => self.frames().next().unwrap_or_else(|| step.clone()),
@@ -104,7 +104,7 @@ impl RenderJob {
         }
     }
 
-    /// All frames of an animation, whichever of them are rendered.
+    /// All frames of an animation, including those not rendered.
     pub(super) fn frames(&self) -> impl Iterator<Item = Step> {
         let sequence = self.sequence.as_ref();
         let frames = sequence.and_then(|sequence| match sequence {
@@ -115,13 +115,13 @@ impl RenderJob {
         frames.into_iter().flatten().map(move |frame| Step { number: Some(frame), moment: moment(frame) })
     }
 
-    /// How to load for a picture.
+    /// Load options for a picture.
     pub(super) fn load_for(&self, step: &Step) -> LoadOptions {
         LoadOptions { moment: step.moment.clone(), ..self.load.clone() }
     }
 }
 
-/// The camera of one picture, and a phrase that says which it is. `survey` is that of all frames, if there are several.
+/// Camera of one picture, and a phrase that describes it. `survey` is that of all frames, if there are several.
 pub(super) fn camera(
     job: &RenderJob,
     shot: &Shot,
@@ -154,7 +154,7 @@ pub(super) fn camera(
     Ok((turned(&camera, scene.up, pivot, angle), phrase))
 }
 
-/// Refuses what there are warnings of, which are said.
+/// Reports the warnings of a scene and fails if there are any.
 fn refuse_warnings(loaded: &Loaded, file: &Path, messages: &Messages) -> Result<(), Exit> {
     if loaded.warnings.is_empty() {
         return Ok(());
@@ -163,7 +163,7 @@ fn refuse_warnings(loaded: &Loaded, file: &Path, messages: &Messages) -> Result<
     Err(messages.fail(&read::not_strict(loaded.warnings.len(), file), Exit::Input))
 }
 
-/// How wide points and lines are in each frame by itself.
+/// Widths of points and lines in each frame.
 #[derive(Default)]
 struct Widths {
     points: Vec<f64>,
@@ -176,7 +176,7 @@ impl Widths {
         self.lines.push(wires.line_width);
     }
 
-    /// The medians: neither a moment at which all is in one place nor one at which something is far away decides.
+    /// Median widths: neither a frame with everything in one place nor one with a distant outlier decides.
     fn usual(mut self) -> Option<[f64; 2]> {
         let median = |all: &mut Vec<f64>| {
             all.retain(|&width| width > 0.0);
@@ -189,23 +189,22 @@ impl Widths {
     }
 }
 
-/// What all frames of an animation take up, found before the first is rendered.
+/// Bounds and cameras of all frames of an animation, determined before the first is rendered.
 pub(super) struct Survey {
-    /// The box of all.
+    /// Bounds of all frames.
     pub bounds: Bounds,
-    /// Whether their lamps are given as they are measured.
+    /// Whether some frame has photometric lamps.
     pub photometric: bool,
-    /// How wide points and lines are in all frames.
+    /// Widths of points and lines in all frames.
     pub wire_widths: Option<[f64; 2]>,
-    /// The camera of each choice that is framed on the model.
+    /// Camera of each choice that is framed on the model.
     cameras: Vec<(Choice, Option<Camera>)>,
 }
 
 impl Survey {
-    /// Loads the geometry of every frame. The default view looks from where the first of them looks good that shows
-    /// anything.
+    /// Loads the geometry of every frame. The default view direction is that of the first frame that shows anything.
     ///
-    /// `None`: the pictures of this job are framed one by one, or none of them shows anything.
+    /// `None` if the pictures of this job are framed one by one, or if no frame shows anything.
     pub(super) fn of(
         job: &RenderJob,
         batch: &Batch,
@@ -238,7 +237,7 @@ impl Survey {
             let scene = &loaded.scene;
             photometric |= scene.photometric;
             widths.add(&loaded.facts.wires);
-            // Animations hide things by a scale of zero.
+            // Animations hide objects by a scale of zero.
             if World::flattened_bytes(scene) == 0 {
                 continue;
             }
@@ -258,19 +257,19 @@ impl Survey {
         }
         Ok(bounds.map(|bounds| {
             let camera = |(choice, fit): (Choice, Option<Fit>)| (choice, fit.map(|fit| fit.camera(bounds.radius())));
-            // Of several models each has its own.
+            // With several models, each has its own widths.
             let is_one = batch.inputs.len() == 1 && !is_scene_file;
             let wire_widths = job.load.wire_widths.or_else(|| widths.usual().filter(|_| is_one));
             Self { bounds, photometric, wire_widths, cameras: fits.into_iter().map(camera).collect() }
         }))
     }
 
-    /// How to load for a picture.
+    /// Load options for a picture.
     pub(super) fn load_for(&self, job: &RenderJob, step: &Step) -> LoadOptions {
         LoadOptions { wire_widths: self.wire_widths, ..job.load_for(step) }
     }
 
-    /// The camera of a choice, if it is framed on the model.
+    /// Camera of a choice, if it is framed on the model.
     pub(super) fn camera(&self, choice: &Choice) -> Option<&Camera> {
         let found = self.cameras.iter().find(|(known, _)| known == choice);
         found.and_then(|(_, camera)| camera.as_ref())

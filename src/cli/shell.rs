@@ -1,4 +1,4 @@
-//! `meshray completions` and `meshray man`: made from the same definitions as the parser.
+//! `meshray completions` and `meshray man`, generated from the parser's definitions.
 
 use super::Exit;
 use super::args::Cli;
@@ -13,14 +13,14 @@ pub(super) fn completions(shell: Shell) -> Exit {
     show(&script)
 }
 
-/// Prints the manual page, the commands' pages behind it.
+/// Prints the manual page, followed by those of the commands.
 pub(super) fn man() -> Exit {
-    // What `help` says stands in these pages.
+    // The pages contain everything that `help` prints.
     let command = Cli::command().disable_help_subcommand(true);
     let mut page = Vec::new();
     let mut rendered = clap_mangen::Man::new(command.clone()).render(&mut page);
     for sub in command.get_subcommands() {
-        // clap holds names by reference; there are a dozen of them, for the life of the process.
+        // clap needs `'static` names; a dozen are leaked, for the life of the process.
         let name: &'static str = format!("meshray-{}", sub.get_name()).leak();
         rendered = rendered.and_then(|()| clap_mangen::Man::new(sub.clone().name(name)).render(&mut page));
     }

@@ -1,4 +1,4 @@
-//! One picture of a scene that was loaded: its eye, its light, its exposure, its pixels, and its way into a file.
+//! Renders one picture of a loaded scene: camera, lights, exposure, pixels, file.
 
 use super::exit::Exit;
 use super::job::{Batch, RenderJob, Shot};
@@ -25,7 +25,7 @@ use crate::scene::{Background, Camera, Scene};
 use std::path::Path;
 use std::time::Instant;
 
-/// What is done for a batch, and who hears of it.
+/// A batch to render, with the sinks of its messages and progress.
 #[derive(Clone, Copy)]
 pub(super) struct Task<'a> {
     pub job: &'a RenderJob,
@@ -35,23 +35,23 @@ pub(super) struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// The first input, after which the batch is called.
+    /// First input, after which the batch is named.
     pub(super) fn file(&self) -> &Path {
         &self.batch.inputs[0]
     }
 
-    /// Says what went wrong.
+    /// Reports a fault.
     pub(super) fn fail(&self, fault: &Diagnostic, exit: Exit) -> Exit {
         self.messages.fail(fault, exit)
     }
 }
 
-/// A scene that is rendered, and the structure that all its pictures share.
+/// Scene to be rendered, with the structure that all its pictures share.
 pub(super) struct Stage<'a> {
     pub loaded: &'a mut Loaded,
     pub world: &'a World,
     pub bounds: &'a Bounds,
-    /// What loading took, until a picture has told it.
+    /// Seconds of loading that no picture has reported yet.
     pub load_seconds: &'a mut f64,
     pub profile: &'a mut Profile,
     pub survey: Option<&'a Survey>,
@@ -66,8 +66,8 @@ impl Stage<'_> {
         found.map_err(|fault| task.fail(&fault, Exit::Input))
     }
 
-    /// Finds the exposure of a view through the eye that this picture of it has, unless it is known or not asked for.
-    /// Whether there is something by which it is exposed.
+    /// Meters a view through the camera of this picture, unless its exposure is known or not needed. Returns whether the exposure
+    /// is settled: false if nothing is lit.
     pub(super) fn meter(&mut self, task: &Task, shot: &Shot) -> Result<bool, Exit> {
         let effective = effective(task, &self.loaded.scene)?;
         if !is_metered(&effective, shot, &self.loaded.scene) || self.metered.get(&shot.choice).is_some() {
@@ -90,7 +90,7 @@ impl Stage<'_> {
     }
 }
 
-/// The structure over a scene, and why that one: for all pictures of the moment that it shows, which are like this one.
+/// Builds the structure over a scene, and returns the reason for its choice; for all pictures of this one's moment.
 fn structure<'w>(task: &Task, shot: &Shot, world: &'w World, settings: &Settings) -> (AnyAccel<'w>, Option<Reason>) {
     let pictures = task.batch.shots.iter().filter(|other| other.step.moment == shot.step.moment).count();
     let eye_rays = settings.fewest_eye_rays().saturating_mul(pictures as u64);
@@ -103,7 +103,7 @@ fn textures<'s>(job: &RenderJob, scene: &'s Scene) -> TextureStore<'s> {
     if job.no_prune { textures.without_pruning() } else { textures }
 }
 
-/// The settings that apply to the pictures of a scene.
+/// Effective settings of the pictures of a scene.
 fn effective(task: &Task, scene: &Scene) -> Result<Effective, Exit> {
     match Effective::new(&task.job.look, scene) {
         Ok(effective) => Ok(effective.without_pruning(task.job.no_prune)),
@@ -111,17 +111,17 @@ fn effective(task: &Task, scene: &Scene) -> Result<Effective, Exit> {
     }
 }
 
-/// Whether the exposure of a picture is found by looking.
+/// Whether the exposure of a picture is metered.
 fn is_metered(effective: &Effective, shot: &Shot, scene: &Scene) -> bool {
     effective.metered && shot.kind != FileKind::Exr && meter::is_due(scene)
 }
 
-/// What is found out about each picture behind it.
+/// Additional data gathered for each picture.
 fn behind(job: &RenderJob) -> Behind {
     Behind { costs: cost_layers::wanted(job).len(), counted: job.stats.is_some() }
 }
 
-/// Whether a picture fits into the memory that is allowed, into a file of its type, and may still be written where it goes.
+/// Checks that a picture fits into the allowed memory and into its file type, and may still be written.
 fn check(task: &Task, shot: &Shot, effective: &Effective, run_state: &RunState) -> Result<(), Exit> {
     let Task { job, .. } = *task;
     let mut targets = outputs::of(shot, job.beside()).into_iter();
@@ -137,13 +137,13 @@ fn check(task: &Task, shot: &Shot, effective: &Effective, run_state: &RunState) 
     })
 }
 
-/// Renders a picture and writes it, or foretells it. The error is how that ended, too, and was said.
+/// Renders and writes a picture, or forecasts it. An error is an exit, too, and has been reported.
 pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, run_state: &mut RunState) -> Result<Exit, Exit> {
     let Task { job, progress, .. } = *task;
     let mut effective = effective(task, &stage.loaded.scene)?;
     check(task, shot, &effective, run_state)?;
 
-    // The eye, then the light that belongs to it: each view has its own.
+    // Camera first, then its lights: each view has its own.
     let (camera, phrase) = stage.camera(task, shot, &effective)?;
     let view = View::from_camera(&camera);
     let middle = (stage.bounds.lo + stage.bounds.hi) * 0.5;
@@ -189,7 +189,7 @@ pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, run_state: &mu
     }))
 }
 
-/// A picture of which all is known but its pixels.
+/// A picture with everything but its pixels.
 struct Prepared<'a> {
     task: &'a Task<'a>,
     shot: &'a Shot,
@@ -197,9 +197,9 @@ struct Prepared<'a> {
     loaded: &'a Loaded,
     bounds: &'a Bounds,
     work: Job<'a>,
-    /// Why its structure was chosen, if it was by counts.
+    /// Reason for the structure, if it was chosen by counts.
     reason: Option<Reason>,
-    /// What view it is, in words.
+    /// Description of the view.
     phrase: &'a str,
     light: DefaultLight,
     /// Whether it is one of several, of which some may show nothing.
@@ -207,7 +207,7 @@ struct Prepared<'a> {
 }
 
 impl Prepared<'_> {
-    /// Says what the picture would take, or keeps it for the file of the statistics.
+    /// Prints the forecast of the picture, or keeps it for the statistics file.
     fn foretell(&self, run_state: &mut RunState) -> Exit {
         let Task { job, messages, progress, .. } = *self.task;
         progress.begin("looking");
@@ -226,12 +226,12 @@ impl Prepared<'_> {
         messages.print(&told).err().unwrap_or_default()
     }
 
-    /// Renders the picture and writes it, and says and keeps what there is to say of it.
+    /// Renders and writes the picture, reports it, and stores its statistics.
     fn draw(&self, mut times: Times, profile: &mut Profile, run_state: &mut RunState) -> Exit {
         let Task { job, messages, progress, batch } = *self.task;
         let Self { shot, effective, loaded, work, .. } = self;
         profile.skip();
-        // Until the picture is written the first signal ends no more than its rays.
+        // Until the picture is written, the first signal only stops its rays.
         let _guard = job.keep_partial.then(interrupt::Guard::new);
         let mut rendered = self.trace(&mut times, profile);
         let costs = rendered.complete.then(|| self.costs(&rendered));
@@ -275,7 +275,7 @@ impl Prepared<'_> {
         }
     }
 
-    /// Warns of a picture that shows nothing, or not what was asked for; whether it did.
+    /// Warns if a picture shows nothing, or not what was requested; returns whether it did.
     fn warn(&self, run_state: &mut RunState) -> bool {
         let Task { job, messages, .. } = *self.task;
         let Self { shot, work, .. } = self;
@@ -284,7 +284,7 @@ impl Prepared<'_> {
             true => None,
             false => empty_picture::warning(work, (&shot.choice, self.phrase), job.look.lens, self.task.file()),
         };
-        // All around a model it is the same.
+        // The warning would be the same for all pictures of a turntable.
         if let Some(warning) = &warned_empty
             && run_state.warned_empty.insert((self.task.file().to_owned(), shot.choice.name()))
         {
@@ -299,12 +299,12 @@ impl Prepared<'_> {
         is_lost || warned_empty.is_some()
     }
 
-    /// Says that there is no picture, as warnings are errors and there was one.
+    /// Reports that there is no picture, because there was a warning and warnings are errors.
     fn refuse_warned(&self) -> Exit {
         self.task.fail(&read::not_strict(1, self.task.file()), Exit::Input)
     }
 
-    /// Where a picture is brighter than its file holds.
+    /// Warning about pixels that are brighter than the file can hold.
     fn clipped(&self, picture: &Picture) -> Option<Diagnostic> {
         let is_half = self.shot.kind == FileKind::Exr && self.effective.output.exr_samples == ExrSamples::Half;
         let count = if is_half { beyond_half(picture) } else { 0 };
@@ -317,7 +317,7 @@ impl Prepared<'_> {
         })
     }
 
-    /// Whether the counts are those of the picture.
+    /// Reports an error if the counted rendering has other pixels than the timed one.
     fn judge(&self, counted: Option<&Counted>) -> Exit {
         if counted.is_none_or(|counted| counted.same) {
             return Exit::Done;
@@ -343,8 +343,8 @@ impl Prepared<'_> {
         rendered
     }
 
-    /// What each pixel cost, and the counts of all for statistics, in passes behind the picture's own; `None` when the user
-    /// gave up.
+    /// Renders the picture again to gather the costs of each pixel and the counts for statistics; `None` when the user
+    /// interrupts.
     fn costs(&self, rendered: &Rendered) -> Option<(Costs, Option<Counted>)> {
         let Task { job, progress, .. } = *self.task;
         let (mut costs, wanted) = (Costs::default(), cost_layers::wanted(job));
@@ -374,7 +374,7 @@ impl Prepared<'_> {
         let Task { messages, .. } = *self.task;
         let Some(target) = outputs::partial(&self.shot.target) else { return Exit::Interrupted };
         let partial = Shot { target, ..self.shot.clone() };
-        // Without settings in it nobody will take it for a finished picture.
+        // Without settings, the file cannot pass for a finished picture.
         let metadata = crate::image::Metadata::new();
         let background = self.work.scene.background;
         let bytes = picture::encoded(&partial, &rendered.picture, self.effective, background, &metadata);
