@@ -14,7 +14,7 @@ pub enum Aim {
     EdgeMiddles,
     /// Any point of an edge.
     Edges,
-    /// Along the plane of a triangle, through it.
+    /// Direction within the plane of a triangle, through it.
     InPlane,
     /// Across a triangle, at an angle of 10⁻¹ to 10⁻⁷ to its plane.
     Grazing,

@@ -19,7 +19,7 @@ impl Spread {
         self.0.len()
     }
 
-    /// Whether nothing was measured.
+    /// Whether there were no passes.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

@@ -11,7 +11,7 @@ pub struct Machine {
     pub cpu: String,
     /// Number of hardware threads available to the process.
     pub cores: usize,
-    /// Operating system and instruction set.
+    /// Operating system and CPU architecture.
     pub system: String,
     /// Instruction set level that the kernels use.
     pub simd: String,

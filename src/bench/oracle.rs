@@ -17,7 +17,7 @@ use crate::math::{DVec3, Vec3};
 /// Triangles per run.
 const RUN: usize = 32;
 
-/// Error of a sum of products of differences in `f64`, relative to the sum of its terms' sizes: fewer than 16 roundings.
+/// Error bound of a sum of products of differences in `f64`, relative to the sum of its terms' sizes: fewer than 16 roundings.
 const DOUBT: f64 = 16.0 * f64::EPSILON;
 
 /// Margin around a run's bounding box, relative to the coordinates of box and ray.

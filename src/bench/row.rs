@@ -24,7 +24,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// Rays whose answer differed from the reference, in all passes.
+    /// Number of rays whose answer differed from the reference, in all passes.
     pub fn differing(&self) -> u64 {
         self.classes.iter().map(|c| c.differing).sum()
     }
@@ -58,7 +58,7 @@ pub struct ClassRow {
     squares: [f64; Count::ALL.len()],
     /// Seconds per ray.
     pub seconds: Spread,
-    /// Rays whose answer differed from the reference.
+    /// Number of rays whose answer differed from the reference.
     pub differing: u64,
     /// Repetitions per timed pass, so that the resolution of the clock does not matter.
     pub(super) repeats: u32,

@@ -104,13 +104,13 @@ pub(super) struct Making<'a> {
     pub batch: &'a Batch,
     /// Picture.
     pub shot: &'a Shot,
-    /// Settings as used.
+    /// Effective settings.
     pub effective: &'a Effective,
     /// Sampling results.
     pub sampled: &'a Sampled,
-    /// Depth as used.
+    /// Effective maximum depth.
     pub depth: u32,
-    /// Structure as used.
+    /// Kind of the structure used.
     pub accel: AccelKind,
     /// Reason for the structure, if it was chosen by counts.
     pub reason: Option<Reason>,
@@ -119,7 +119,7 @@ pub(super) struct Making<'a> {
 }
 
 impl Making<'_> {
-    /// Names of the inputs as typed.
+    /// Names of the inputs, as typed.
     pub(super) fn inputs(&self) -> Vec<String> {
         self.batch.inputs.iter().map(|i| i.to_string_lossy().into_owned()).collect()
     }

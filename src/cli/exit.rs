@@ -39,7 +39,8 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Exit of a model that cannot be loaded. A retry can help if all faults are about memory or a missing root folder.
+/// Exit of a model that cannot be loaded. A retry can help if a file could not be read, or if all faults are about memory or a
+/// missing root folder.
 impl From<&LoadError> for Exit {
     fn from(error: &LoadError) -> Self {
         let is_not_of_the_file = |fault: &Diagnostic| match fault.code {

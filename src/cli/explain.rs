@@ -1,11 +1,11 @@
 //! `meshray explain`: why a mesh costs what it does, and what would help.
 //!
 //! # Schema `meshray-explain/1`
-//! One JSON object: `version`, `file`, `hash`, `view`, `width`, `height`, `accel`, `prims` (N); `usual` by ray class
-//! (`primary`, `shadow`, `reflected`, `refracted`) and `all`, each with `rays`, `tests` (ray/prim), `steps` (nodes and cells
-//! visited), `transforms` (points) and `cost` (all three); `causes`, the greatest saving first, each with `cause`, `evidence`,
-//! `remedy`, `saving` (a share of the cost; negative where it grows), `keeps_the_picture`, `drawn_anew` (whether some of the
-//! saving is chance: rough surfaces scatter other rays) and `without` (as `usual`). Keys are only ever added.
+//! One JSON object: `version`, `file`, `hash`, `view`, `width`, `height`, `accel`, `prims` (N); `usual` by ray class (`primary`,
+//! `shadow`, `reflected`, `refracted`) and `all`, each with `rays`, `tests` (ray/prim), `steps` (nodes and cells visited),
+//! `transforms` (points) and `cost` (sum of these three); `causes`, by descending saving, each with `cause`, `evidence`,
+//! `remedy`, `saving` (share of the cost; negative where it grows), `keeps_the_picture`, `drawn_anew` (whether part of the saving
+//! is chance: rough surfaces scatter other rays) and `without` (as `usual`). Keys are only ever added.
 
 use super::args::ExplainArgs;
 use super::exit::Exit;

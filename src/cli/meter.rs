@@ -16,13 +16,13 @@ use std::time::Instant;
 /// Longest side of the small picture, in pixels.
 const SIDE: u32 = 96;
 
-/// Share of the model's pixels that may exceed the reference luminance.
+/// Share of the model's lit pixels that may be brighter than [`BRIGHT`].
 const ABOVE: f32 = 0.1;
 
-/// Reference luminance after exposure …
+/// Luminance to which the brightest of the others are brought …
 const BRIGHT: f32 = 0.7;
 
-/// … which is only adjusted outside this range: light within it is taken as intended.
+/// … unless they are in this range already: such light is taken as intended.
 const FINE: std::ops::RangeInclusive<f32> = 0.15..=1.5;
 
 /// Exposure in stops of each view metered so far.

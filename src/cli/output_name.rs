@@ -173,7 +173,7 @@ fn in_one_case(name: PathBuf) -> PathBuf {
     if CASE_IS_IGNORED { name.to_string_lossy().to_lowercase().into() } else { name }
 }
 
-/// `shot.png` -> `shot.partial.png`, `shot` -> `shot.partial`.
+/// Name of an interrupted picture: `shot.png` -> `shot.partial.png`, `shot` -> `shot.partial`.
 pub(super) fn partial(name: &Path) -> PathBuf {
     let extension = name.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
     name.with_extension(format!("partial{extension}"))

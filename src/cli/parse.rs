@@ -284,7 +284,7 @@ pub(super) fn triangles(text: &str) -> Result<usize, String> {
     number.map(|n| n as usize).ok_or_else(|| "write a number of triangles from 1 to 1e7".into())
 }
 
-/// Numbers of triangles, ascending.
+/// Numbers of triangles, in ascending order.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Sizes(pub Vec<usize>);
 

@@ -44,7 +44,7 @@ pub(super) fn beside(limits: &Limits, bytes: u64) -> Limits {
     Limits { memory, file: limits.file.min(memory), ..*limits }
 }
 
-/// Loads one model and reports its warnings; a failure is reported too. Refuses scenes that cannot be flattened.
+/// Loads one model and reports its warnings; a failure is reported too. Refuses a scene too large to flatten.
 pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exit> {
     let ModelArgs { input, load, .. } = args;
     let loaded = model_as_stored(input, load, messages)?;

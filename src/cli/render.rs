@@ -158,7 +158,7 @@ pub(super) fn writable_shots<'a>(
     let mut worst = Exit::Done;
     let mut shots = Vec::new();
     for shot in &batch.shots {
-        // Forecasts write no picture to standard output.
+        // A forecast writes no picture, so standard output may be a terminal.
         let goes = |target: &Target| !job.dry_run || target.path().is_some();
         let mut targets = outputs::of(shot, job.beside()).into_iter().filter(goes);
         let growth = shot.growth.as_deref();
@@ -318,7 +318,7 @@ fn kind_of(warning: &Diagnostic) -> Kind {
     (warning.code, warning.file.clone(), warning.place.clone(), words)
 }
 
-/// Loads the inputs of a picture in the memory left by the `--env` panorama; if that fails, drops the panorama and tries again.
+/// Loads the inputs of a picture in the memory left by the `--env` panorama; if that is too little, without the panorama.
 fn load(job: &RenderJob, batch: &Batch, options: LoadOptions) -> Result<Loaded, LoadError> {
     let (env, limits) = (&job.look.env_read, options.limits);
     let kept = env.kept();

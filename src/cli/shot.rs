@@ -202,7 +202,7 @@ struct Prepared<'a> {
     /// Description of the view.
     phrase: &'a str,
     light: DefaultLight,
-    /// Whether it is one of several, of which some may show nothing.
+    /// Whether the picture is one of several frames, some of which may show nothing.
     is_frame: bool,
 }
 

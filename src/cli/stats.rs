@@ -1,23 +1,23 @@
-//! `--stats`: what pictures cost, as a table or as JSON.
+//! `--stats`: costs of pictures, as a table or as JSON.
 //!
 //! # Schema `meshray-stats/1`
-//! One JSON object a line for each picture written:
+//! One JSON object per picture written, each on its own line:
 //!
 //! | key | what |
 //! |---|---|
 //! | `schema`, `version` | `meshray-stats/1`; version of meshray |
-//! | `inputs`, `output`, `input_hash` | files as typed (`-`: standard streams); xxh3-128 of what was read, hexadecimal |
-//! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `intersector`, `threads` | settings that were used |
-//! | `sampling` | `aa` and its settings (then `samples`, that of uniform sampling, is `null`); eye `rays`, their `mean` for each pixel of the picture (those that tiles trace again at their borders, and those `looked` with, are among them), the `samples_a_pixel` that the picture was made of on the average, and the `most` of one; of stochastic sampling pixels that `met` `pixel_error`, those stopped at the `ceiling`, rays `spare`, those with which it was `looked` beforehand for what rays spread by chance seldom meet (but for the first ones of a small picture, which are its own), and the picture's `rmse` in `error_space`: of several renderings estimated, of one a cautious bound |
-//! | `auto` | `null`, or why `--accel auto` took `accel`: `why` in words; `rays` and `prims` of the sample; cost of a ray through `fast-octree` and `fast-bvh`, in nodes of eight boxes, `null` where no sample was taken |
-//! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); of grids and octrees `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `grid_cells` (`null`: by density), `max_references`, `assign`, `mailbox` as well |
-//! | `seconds` | of the timed run: `load`, `build`, `meter` (finding the exposure of lamps in lux and candela), `render`, `write`; `load` and `build` are 0 for further pictures of one scene, `meter` is 0 for further pictures of one view and where no lamps are metered |
-//! | `animation` | `null`, or which one is shown: its `number` in the file, and the `time` in seconds, its end at most |
-//! | `scene` | as shown: `triangles`, `polygons`, `spheres`, `cones` (cylinders too), `planes`, `materials`, `textures`, `lights`; as stored: `vertices`, `stored_triangles`, `bytes` of all shapes; `kept_instances`: those of meshes that are stored once |
+//! | `inputs`, `output`, `input_hash` | files as typed (`-`: standard streams); xxh3-128 of everything read, hexadecimal |
+//! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `intersector`, `threads` | settings used |
+//! | `sampling` | `aa` and its settings (top-level `samples` is `null` unless uniform); primary `rays`, their `mean` per pixel of the picture (including those traced again at tile borders and those `looked` with), the mean `samples_a_pixel` that the picture was made of, and the `most` of one pixel; for stochastic sampling: pixels that `met` `pixel_error`, pixels stopped at the `ceiling`, rays `spare`, rays with which it was `looked` beforehand for objects that randomly spread rays seldom hit (except the first ones of a small picture, which are its own), and the picture's `rmse` in `error_space`: estimated from several renderings, or a cautious bound from one |
+//! | `auto` | `null`, or the reason for the choice of `--accel auto`: `why` in words; `rays` and `prims` of the sample; cost per ray of `fast-octree` and `fast-bvh`, in nodes of eight boxes, `null` without a sample |
+//! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); for grids and octrees also `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `grid_cells` (`null`: by density), `max_references`, `assign`, `mailbox` |
+//! | `seconds` | of the timed run: `load`, `build`, `meter` (exposure of lamps in lux and candela), `render`, `write`; `load` and `build` are 0 for further pictures of one scene, `meter` is 0 for further pictures of one view and without metered lamps |
+//! | `animation` | `null`, or the one shown: its `number` in the file, and the `time` in seconds, clamped to its end |
+//! | `scene` | as shown: `triangles`, `polygons`, `spheres`, `cones` (cylinders too), `planes`, `materials`, `textures`, `lights`; as stored: `vertices`, `stored_triangles`, `bytes` of all shapes; `kept_instances`: instances of meshes stored once |
 //! | `structure` | V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`; `bytes` and `depth` |
 //! | `counts` | for each ray class `primary`, `shadow`, `reflected`, `refracted`, and `all`: exact `rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`, `tests_saved`, `transforms`; and per ray `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf`; `culled` = 1 − n_it / N |
 //! | `counted_seconds` | time of the second run that counted; never compare it with `seconds` |
-//! | `profile` | `null`, or with `--profile` its `stages`: `stage`, `part_of` (a class of rays and `shade` are parts of `tiles`), seconds `wall` (`null` of parts) and `cpu` of all threads, `rays` of a class; `peak_memory`, bytes (`null`: the system does not say) |
+//! | `profile` | `null`, or with `--profile` its `stages`: `stage`, `part_of` (ray classes and `shade` are parts of `tiles`), seconds `wall` (`null` for parts) and `cpu` of all threads, `rays` of a class; `peak_memory`, bytes (`null` if unknown) |
 //! | `rounding` | largest displacement of a vertex by rounding, world units |
 //!
 //! Keys are only ever added; a change of meaning gets another schema name.
@@ -37,28 +37,28 @@ use serde_json::{Value, json};
 use std::time::Instant;
 use std::{fs, io};
 
-/// Seconds of the stages.
+/// Seconds per stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Times {
-    /// Reading and decoding; 0 when an earlier picture has paid for it.
+    /// Reading and decoding; 0 if reported for an earlier picture.
     pub load: f64,
-    /// The structure.
+    /// Building the structure.
     pub build: f64,
-    /// The exposure of lamps; 0 when nothing was metered.
+    /// Metering the exposure; 0 if nothing was metered.
     pub meter: f64,
-    /// Rays.
+    /// Tracing and shading.
     pub render: f64,
     /// Encoding and writing.
     pub write: f64,
 }
 
 impl Times {
-    /// One line for people.
+    /// Times in one line of text.
     pub(super) fn line(&self, eye_rays: u64) -> String {
         format!("{}; {}", self.told().join(", "), so_many(eye_rays, "eye ray"))
     }
 
-    /// The stages by name, each with its time; metering only where there was any.
+    /// Stages with their times; metering only if there was any.
     fn told(&self) -> Vec<String> {
         let is_told = |(name, time): &(&str, f64)| *name != "meter" || *time > 0.0;
         let told = self.stages().into_iter().filter(is_told);
@@ -75,20 +75,20 @@ impl Times {
     }
 }
 
-/// A counted run.
+/// Results of a counted run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Counted {
-    /// By ray class.
+    /// Counts by ray class.
     pub counts: ClassCounts,
-    /// Its own time.
+    /// Time of the counted run.
     pub seconds: f64,
-    /// Prims of all kinds.
+    /// Number of prims of all kinds.
     pub prims: u64,
-    /// Whether it gave the pixels of the timed run; otherwise it counted another picture.
+    /// Whether the pixels equal those of the timed run; otherwise the counts are of another picture.
     pub same: bool,
 }
 
-/// Renders once more, counting. `None` when the user gave up.
+/// Renders once more, counting; `None` when the user interrupts.
 pub(super) fn count(work: &Job, timed: &Rendered, progress: &dyn Progress) -> Option<Counted> {
     let start = Instant::now();
     let counted = crate::render::render_counted(work, progress);
@@ -101,7 +101,7 @@ pub(super) fn count(work: &Job, timed: &Rendered, progress: &dyn Progress) -> Op
 }
 
 impl Counted {
-    /// By ray class and together.
+    /// Counts by ray class and in total.
     pub(super) fn json(&self) -> Value {
         let mut all = RayCounts::default();
         let mut classes = serde_json::Map::new();
@@ -133,7 +133,7 @@ fn class_json(c: &RayCounts, prims: u64) -> Value {
     })
 }
 
-/// What the parameters of a structure were, those that it has.
+/// Parameters of a structure that apply to its kind, as used.
 fn parameters(kind: AccelKind, params: &AccelParams) -> Value {
     match kind {
         AccelKind::Bvh => json!({ "leaf_size": params.tree_leaf_size() }),
@@ -150,15 +150,15 @@ fn parameters(kind: AccelKind, params: &AccelParams) -> Value {
     }
 }
 
-/// Everything about one picture.
+/// Statistics of one picture.
 pub(super) struct PictureStats {
     json: Value,
-    /// The statistics for people, without all settings.
+    /// Statistics as text, without all settings.
     text: String,
 }
 
 impl PictureStats {
-    /// Gathers it.
+    /// Gathers the statistics.
     pub(super) fn new(
         making: &Making,
         view: &str,
@@ -173,7 +173,7 @@ impl PictureStats {
         let sampling = sampling::json(settings, making.sampled);
         let (scene, shapes) = (&making.loaded.scene, &world.shapes);
         let kept_vertices: usize = world.instanced.objects().iter().map(|o| o.shapes().vertices.len()).sum();
-        // Every corner is looked at, which is not done for pictures without statistics.
+        // This loops over all corners, which pictures without statistics avoid.
         let rounding = counted.as_ref().map(|_| making.loaded.facts.max_rounding + world.rounding(scene));
         let json = json!({
             "schema": "meshray-stats/1", "version": super::version::SHORT,
@@ -214,7 +214,7 @@ impl PictureStats {
     }
 }
 
-/// What people are told.
+/// Statistics as text.
 fn told(making: &Making, times: &Times, world: &World, structure: StructureStats, counted: Option<&Counted>) -> String {
     let (settings, shapes) = (&making.effective.settings, &world.shapes);
     let mut lines = vec![format!(
@@ -270,7 +270,7 @@ fn count_table(counted: &Counted) -> Vec<String> {
     lines
 }
 
-/// The statistics of all pictures, if they were asked for; empty where there are none.
+/// Statistics of all pictures in the requested format; empty without any.
 pub(super) fn text(job: &RenderJob, pictures: &[PictureStats]) -> String {
     let line = |picture: &PictureStats| match job.stats.as_ref().map(|stats| stats.format) {
         Some(StatsFormat::Json) => format!("{}\n", picture.json),
@@ -280,12 +280,12 @@ pub(super) fn text(job: &RenderJob, pictures: &[PictureStats]) -> String {
     pictures.iter().map(line).collect()
 }
 
-/// Prints the statistics, or writes them to the file that was named.
+/// Prints the statistics, or writes them to the requested file.
 pub(super) fn report(job: &RenderJob, text: &str, messages: &Messages) -> Exit {
     let result = match job.stats_file() {
         None => super::print(text),
         Some(path) => {
-            // No picture may have made it.
+            // The folder may not exist yet if no picture was written.
             let made = outputs::grows_with(&job.batches, path).map_or(Ok(()), fs::create_dir_all);
             made.and_then(|()| interrupt::write_atomic(path, text.as_bytes()))
                 .map_err(|e| io::Error::new(e.kind(), format!("{}: {e}", path.display())))

@@ -1,4 +1,4 @@
-//! `meshray study`: what each knob buys on a model, and which settings to use.
+//! `meshray study`: benefit of each knob on a model, and recommended settings.
 
 use super::args::StudyArgs;
 use super::exit::Exit;
@@ -18,7 +18,7 @@ use crate::scene::framing::robust_bounds;
 use crate::threads;
 use std::path::PathBuf;
 
-/// Loads the model, renders it with every setting, and prints and writes rows as they come.
+/// Loads the model, renders it with every setting, and prints and writes rows as they are measured.
 pub(super) fn run(args: &StudyArgs) -> Exit {
     let messages = Messages::new(args.model.messages.into(), args.quiet);
     let typed = |path: &PathBuf| Ok((path.clone(), Format::from_path(path).map_err(UsageError)?));
@@ -108,14 +108,14 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
     Ok(if study.complete { Exit::Done } else { Exit::Interrupted })
 }
 
-/// Where rows go as they come.
+/// Sinks of the rows.
 struct Told<'a> {
     files: &'a [(PathBuf, Format)],
     messages: &'a Messages,
 }
 
 impl Told<'_> {
-    /// Writes every report with what there is so far, so that a crash costs one row.
+    /// Writes every report with the rows so far, so that a crash costs only one row.
     fn write(&self, study: &Study) -> Result<(), Exit> {
         self.files.iter().try_for_each(|(path, format)| {
             let bytes = format.write(study).into_bytes();

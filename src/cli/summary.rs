@@ -1,4 +1,4 @@
-//! What is said of a finished picture.
+//! Report on a finished picture.
 
 use super::job::Shot;
 use super::message::{Messages, Severity};
@@ -13,14 +13,14 @@ use crate::scene::default_light::DefaultLight;
 use crate::scene::framing::Bounds;
 use std::path::Path;
 
-/// Which animation is shown, and when: at its end where a later time was asked for.
+/// Index of the animation shown, and its time, clamped to its end.
 pub(super) fn shown(facts: &Facts) -> Option<(usize, f64)> {
     let (number, time) = facts.shown?;
     let end = facts.animations.get(number).map_or(time, |animation| animation.seconds);
     Some((number, time.min(end)))
 }
 
-/// The lines at the end of a picture.
+/// Final messages about a picture.
 pub(super) struct Summary<'a> {
     pub shot: &'a Shot,
     pub effective: &'a Effective,
@@ -31,7 +31,7 @@ pub(super) struct Summary<'a> {
 }
 
 impl Summary<'_> {
-    /// What was drawn, and how long it took.
+    /// Reports what was drawn, and how long it took.
     pub(super) fn say(&self, rendered: &Rendered, times: &Times, messages: &Messages) {
         let name = self.shot.target.path().unwrap_or(Path::new("-"));
         let say = |code, text: String| messages.say(Severity::Info, &Diagnostic::new(code, name, "", text));

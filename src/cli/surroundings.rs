@@ -1,4 +1,4 @@
-//! What lights a scene besides its own lamps, as the command line says it.
+//! Environment and default lights of a scene, as the command line wants them.
 
 use super::job::Look;
 use super::parse::Env;
@@ -14,10 +14,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use xxhash_rust::xxh3::xxh3_128;
 
-/// Puts what `--env` names around the scene.
+/// Sets the environment of `--env`.
 ///
 /// # Errors
-/// When it names a picture that cannot be used.
+/// If it names a picture that cannot be used.
 pub(super) fn place(look: &Look, limits: &Limits, loaded: &mut Loaded) -> Result<(), LoadError> {
     match &look.env {
         None => {}
@@ -39,11 +39,11 @@ pub(super) fn place(look: &Look, limits: &Limits, loaded: &mut Loaded) -> Result
     Ok(())
 }
 
-/// The panorama of `--env`, read once for all models of a command, and what a picture has prepared of it.
+/// Panorama of `--env`, read once for all models of a command.
 #[derive(Clone, Default)]
 pub(super) struct EnvRead(Arc<Mutex<Option<(PathBuf, LoadedPanorama)>>>);
 
-/// Written alike whatever was read: requests are told apart by how they are written ([`up_to_date`](super::up_to_date)).
+/// Independent of what was read: [`up_to_date`](super::up_to_date) compares requests by their debug text.
 impl fmt::Debug for EnvRead {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.debug_struct("EnvRead").finish_non_exhaustive()
@@ -51,10 +51,10 @@ impl fmt::Debug for EnvRead {
 }
 
 impl EnvRead {
-    /// Reads it, unless that was done already for another model that left as much memory.
+    /// Reads the panorama, unless it was already read for another model and fits into the memory left.
     fn panorama(&self, file: &Path, limits: &Limits) -> Result<LoadedPanorama, LoadError> {
-        // Another thread that wants it waits: to read it twice would take longer, and twice the memory. Threads that wait here
-        // are those of inputs side by side, which lend none to each other's work.
+        // Other threads that need it wait: reading it twice would take longer, and twice the memory. The waiting threads render
+        // inputs in parallel, and do not take part in each other's work.
         let mut read = self.read();
         if let Some((_, read)) = read.as_ref().filter(|(of, read)| of == file && read.fits(limits)) {
             return Ok(read.clone());
@@ -63,12 +63,12 @@ impl EnvRead {
         Ok(read.insert((file.to_owned(), loaded)).1.clone())
     }
 
-    /// Bytes of memory that it takes.
+    /// Memory that the panorama occupies, in bytes.
     pub(super) fn kept(&self) -> u64 {
         self.read().as_ref().map_or(0, |(_, read)| read.bytes())
     }
 
-    /// Gives that memory back: it is read again when it is wanted.
+    /// Frees that memory; the panorama is read again when needed.
     pub(super) fn forget(&self) {
         *self.read() = None;
     }
@@ -78,8 +78,8 @@ impl EnvRead {
     }
 }
 
-/// Has `work` done with the scene as `camera` sees it: lit by lamps where it has none, with suns as wide as they were asked for,
-/// and with what is behind everything. The next view starts from the scene as it was loaded.
+/// Calls `work` with the scene as lit for `camera`: with default lamps if it has none, suns of the requested size, and the
+/// background. Afterwards the scene is restored for the next view.
 pub(super) fn lit<T>(
     look: &Look,
     loaded: &mut Loaded,
@@ -96,10 +96,9 @@ pub(super) fn lit<T>(
     done
 }
 
-/// Lights the scene as `camera` sees it: with lamps where it has none, unless darkness was asked for, and with suns as wide
-/// as was.
+/// Lights the scene for `camera`: adds default lamps if it has none, unless darkness was requested, and sets the size of suns.
 fn light(look: &Look, scene: &mut Scene, camera: &Camera) -> DefaultLight {
-    // Of a scene black is what it has when it says nothing; typed, it is meant.
+    // A scene without an environment is black by default; if typed, black is intended.
     let light = match look.env {
         Some(Env::BuiltIn(Environment::Black)) => DefaultLight::NotWanted,
         _ => default_light::add_if_missing(scene, camera),
@@ -108,7 +107,7 @@ fn light(look: &Look, scene: &mut Scene, camera: &Camera) -> DefaultLight {
         let suns = scene.lights.iter_mut().filter(|l| matches!(l.kind, LightKind::Directional { .. }) && l.size == 0.0);
         suns.for_each(|light| light.size = 0.5 * degrees.to_radians());
     }
-    // Lamps that were missing bring the studio along; what was asked for comes before that.
+    // Default lamps bring the studio along; a requested environment takes precedence.
     if let Some(Env::BuiltIn(environment)) = look.env {
         scene.environment = environment;
     }

@@ -1,8 +1,8 @@
-//! `--update`: which pictures are what rendering them would make again.
+//! `--update`: finds the pictures that rendering would only reproduce.
 //!
-//! A picture that was made with it carries what was asked for, and of which program, as one hash, and the hash of each file
-//! that was read. It is up to date if all are the same still, whatever the times of the files say. (Other pictures carry
-//! nothing of how they were asked for: there are several ways to ask for one.)
+//! A picture rendered with `--update` stores a hash of its request and of the program, and the hash of each file that was read.
+//! It is up to date if all of these are unchanged, whatever the modification times. (Other pictures do not store their request:
+//! there are several ways to request the same.)
 
 use super::archives;
 use super::job::{Batch, RenderJob, Shot};
@@ -17,14 +17,14 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
-/// Bytes that are read of a file at a time.
+/// Bytes of a file read at a time.
 const CHUNK: usize = 1 << 16;
 
-/// Letters that are carried at most: a JPEG has no room for many times as many.
+/// Maximum length of the stored text: a JPEG cannot hold many times as much.
 const MOST: usize = 1 << 15;
 
-/// What a picture was made of, as it carries it: `asked`, under `files` the hash of each, and whether there are `gaps`, where one
-/// was looked for that was not there; `None` where a file has no name, and where there are hundreds of them.
+/// Text stored in a picture about what it was made of: `asked`, the hash of each file under `files`, and whether there were
+/// `gaps`, files that were looked for but missing; `None` if a file has no name, and with hundreds of files.
 pub(super) fn made_of(job: &RenderJob, batch: &Batch, shot: &Shot, loaded: &Loaded) -> Option<String> {
     if batch.inputs.iter().any(|input| input == Path::new("-")) {
         return None;
@@ -36,8 +36,8 @@ pub(super) fn made_of(job: &RenderJob, batch: &Batch, shot: &Shot, loaded: &Load
     (text.len() <= MOST).then_some(text)
 }
 
-/// The files that the picture was made of, if it is there and is what it would be if it were rendered now, as far as that is
-/// known before the model is loaded: what was looked for in vain may be there by now.
+/// Files that the existing picture was made of, if it is up to date as far as is known before loading the model. Pictures with
+/// gaps are not, since the missing files may exist by now.
 pub(super) fn up_to_date(job: &RenderJob, batch: &Batch, shot: &Shot) -> Option<Vec<PathBuf>> {
     let Value::Object(made_of) = serde_json::from_str(&carried(shot)?).ok()? else { return None };
     let Value::Object(files) = made_of.get("files")? else { return None };
@@ -52,7 +52,7 @@ pub(super) fn up_to_date(job: &RenderJob, batch: &Batch, shot: &Shot) -> Option<
     same.then(|| files.keys().map(PathBuf::from).collect())
 }
 
-/// Whether an archive would still be taken for that model of it which was read.
+/// Whether an archive would still be read for the same model.
 fn is_still_meant(input: &Path, files: &Map<String, Value>) -> bool {
     let archive = if input.is_file() { archive::opened(input) } else { Ok(None) };
     match archive {
@@ -65,28 +65,27 @@ fn is_still_meant(input: &Path, files: &Map<String, Value>) -> bool {
     }
 }
 
-/// Whether the picture that is there was made of what is loaded now.
+/// Whether the existing picture was made of what is loaded now.
 pub(super) fn is_as_loaded(job: &RenderJob, batch: &Batch, shot: &Shot, loaded: &Loaded) -> bool {
     let made_of = made_of(job, batch, shot, loaded);
     made_of.is_some() && made_of == carried(shot)
 }
 
-/// What the picture that is there says it was made of.
+/// Text on what the existing picture was made of.
 fn carried(shot: &Shot) -> Option<String> {
     let picture = shot.target.path().filter(|path| path.is_file())?;
     let metadata = read_metadata(picture).ok().flatten()?;
     metadata.get(Metadata::MADE_OF).map(str::to_owned)
 }
 
-/// The hash of all that decides about a picture but for what is in the files: the same words of the command line give the
-/// same to the same program.
+/// Hash of everything that determines a picture except the contents of files: equal for equal command lines of the same program.
 fn asked(job: &RenderJob, batch: &Batch, shot: &Shot) -> String {
     let how = (&job.load, &job.look, &job.sequence, job.accel, job.intersector, &job.params, job.instances);
     let which = (&batch.inputs, &shot.choice, &shot.step, shot.kind, job.allow_empty, job.strict);
     hex(xxh3_128(format!("{}\n{how:?}\n{which:?}", *PROGRAM).as_bytes()))
 }
 
-/// Which program this is: the hash of its file, since builds of one version may draw differently; its version where it cannot be
+/// Identity of the program: the hash of its file, since builds of one version may draw differently; its version if it cannot be
 /// read.
 static PROGRAM: LazyLock<String> = LazyLock::new(|| {
     let hash = std::env::current_exe().and_then(|program| hash_of_file(&program));
@@ -95,7 +94,7 @@ static PROGRAM: LazyLock<String> = LazyLock::new(|| {
 
 fn hash_of_file(path: &Path) -> io::Result<u128> {
     let Ok(metadata) = path.metadata() else { return archives::read(path).map(|bytes| xxh3_128(&bytes)) };
-    // Opening anything but a plain file could wait for ever.
+    // Opening anything but a plain file could block forever.
     if !metadata.is_file() {
         return Err(io::ErrorKind::InvalidInput.into());
     }

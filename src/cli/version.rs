@@ -1,8 +1,8 @@
-//! What `--version` says.
+//! Output of `--version`.
 
 use std::sync::LazyLock;
 
-/// Optional parts, and whether this build has them.
+/// Optional features, and whether this build has them.
 const FEATURES: [(&str, bool); 4] = [
     ("basisu", cfg!(feature = "basisu")),
     ("cli", cfg!(feature = "cli")),

@@ -1,4 +1,4 @@
-//! One model from one side: what commands start from that judge a single view.
+//! A model seen by one camera: start of the commands that judge a single view.
 
 use super::args::{EyeArgs, ModelArgs};
 use super::camera::{self, Choice, LensChoice};
@@ -12,30 +12,30 @@ use crate::scene::framing::robust_bounds;
 use crate::scene::{RenderHints, Scene};
 use std::path::Path;
 
-/// A model that was loaded and lit, and the eye that sees it.
+/// A loaded model with lights, and its camera.
 pub(super) struct ViewedModel {
     pub loaded: Loaded,
-    /// Its scene, placed for tracing; holds something to hit.
+    /// Scene prepared for tracing; it has something to hit.
     pub world: World,
     pub view: View,
-    /// What view that is, in words.
+    /// Description of the view.
     pub phrase: String,
 }
 
-/// The settings of a picture of that many columns and rows: as typed, as the scene's file says, or as usual.
+/// Settings of a picture of this size: as typed, or as in the scene file, or the defaults.
 pub(super) fn settings((width, height): (u32, u32), depth: Option<u32>, hints: &RenderHints) -> Settings {
     let usual = Settings::default();
     Settings { width, height, depth: depth.or(hints.depth), cutoff: hints.cutoff.unwrap_or(usual.cutoff), ..usual }
 }
 
-/// What is said of a model in which there is nothing that a ray could hit.
+/// Fault of a model without anything that a ray could hit.
 pub(super) fn nothing_to_hit(file: &Path) -> Diagnostic {
     let fault = Diagnostic::new("nothing-to-draw", file, "", "there is nothing in it that a ray could hit");
     fault.remedy("inspect tells what it holds")
 }
 
-/// The eye that sees a scene in a picture of that many columns and rows, and what view that is, in words; where the scene has no
-/// lamps, it gets those that go with the eye.
+/// Camera for a picture of this size, and a phrase that describes the view. A scene without lamps gets the default ones, which
+/// depend on the camera.
 pub(super) fn eye(
     scene: &mut Scene,
     (choice, lens): (&Choice, Option<LensChoice>),
@@ -48,7 +48,7 @@ pub(super) fn eye(
     Ok((View::from_camera(&camera), phrase))
 }
 
-/// Loads a model for a picture of that many columns and rows; what is wrong with it is said.
+/// Loads a model for a picture of this size; its faults are reported.
 pub(super) fn model(
     args: &ModelArgs,
     eye: &EyeArgs,

@@ -1,4 +1,4 @@
-//! Whether a file may be written under a name: asked before any work is done for it.
+//! Checks, before any work, whether a file may be written under a name.
 
 use super::archives;
 use super::output_name::{collision, identity};
@@ -9,34 +9,34 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Files that are read, which nothing that is written may replace.
+/// Set of input files, which no output may replace.
 ///
-/// Whoever has a clone of them knows what is added to any.
+/// Clones share one set: files added to one are known to all.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sources(Arc<Mutex<HashSet<PathBuf>>>);
 
 impl Sources {
-    /// These files; `-`, standard input, is none.
+    /// Set of these files, except `-` (standard input).
     pub(super) fn of(files: impl IntoIterator<Item: AsRef<Path>>) -> Self {
         let sources = Self::default();
         sources.add(files);
         sources
     }
 
-    /// These files, too.
+    /// Adds files.
     pub(super) fn add(&self, files: impl IntoIterator<Item: AsRef<Path>>) {
         let named = files.into_iter().filter(|file| file.as_ref() != Path::new("-"));
-        // Of what lies in an archive the archive is read.
+        // For files in an archive, the archive itself is read.
         let files: Vec<PathBuf> = named.map(|file| identity(archives::on_disk(file.as_ref()))).collect();
         self.known().extend(files);
     }
 
     fn known(&self) -> MutexGuard<'_, HashSet<PathBuf>> {
-        // Nothing that can fail is done while it changes.
+        // No operation under the lock can panic halfway, so a poisoned lock is harmless.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Refuses `path`, given with `flag`, where that is one of them.
+    /// Refuses `path`, given with `flag`, if it is one of the files.
     pub(super) fn spared_by(&self, path: &Path, flag: &str) -> Result<(), Diagnostic> {
         let file = identity(path);
         if self.known().contains(&file) {
@@ -46,17 +46,17 @@ impl Sources {
         Ok(())
     }
 
-    /// Refuses a picture that would go where one of these files is.
+    /// Refuses a picture target that is one of the files.
     pub(super) fn spared_by_target(&self, target: &Target) -> Result<(), Diagnostic> {
         target.path().map_or(Ok(()), |path| self.spared_by(path, "-o"))
     }
 }
 
-/// The code of what is said where the folder of a file is not there.
+/// Code of the fault when a file's folder is missing.
 pub(super) const NO_FOLDER: &str = "output-folder";
 
-/// Refuses `path`, given with `flag`, where its folder is not there, where it is a folder itself or read-only, or where it is
-/// one of `sources`.
+/// Refuses `path`, given with `flag`, if its folder is missing, if it is a folder itself or read-only, or if it is one of
+/// `sources`.
 pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Diagnostic> {
     let fault = |code, text: &str, remedy: &str| Err(Diagnostic::new(code, path, "", text).remedy(remedy));
     let goal = destination(path);
@@ -79,7 +79,7 @@ pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Di
     sources.spared_by(path, flag)
 }
 
-/// [`check`], where `growth`, if there is one, and folders below it are made, and need not be there; what that lies in must.
+/// Like [`check`], but `growth` and folders below it may be missing, as they are created; its parent must exist.
 pub(super) fn check_in(path: &Path, flag: &str, growth: Option<&Path>, sources: &Sources) -> Result<(), Diagnostic> {
     match check(path, flag, sources) {
         Err(fault) if fault.code == NO_FOLDER && growth.is_some_and(can_be) => Ok(()),
@@ -87,9 +87,9 @@ pub(super) fn check_in(path: &Path, flag: &str, growth: Option<&Path>, sources: 
     }
 }
 
-/// Whether a picture may go there: to a pipe or a file behind standard output, or under a name that it may replace.
+/// Checks a picture target: standard output must be no terminal, and a file must be one that may be created or replaced.
 ///
-/// `growth` is as [`check_in`] has it.
+/// For `growth` see [`check_in`].
 pub(super) fn check_target(target: &Target, growth: Option<&Path>, sources: &Sources) -> Result<(), Diagnostic> {
     let Some(path) = target.path() else {
         use std::io::IsTerminal;
@@ -105,13 +105,13 @@ pub(super) fn check_target(target: &Target, growth: Option<&Path>, sources: &Sou
     Ok(())
 }
 
-/// Whether a folder is there or can be made in one that is; not where a link leads nowhere.
+/// Whether a folder exists, or can be created in an existing one; false for a dangling link.
 fn can_be(folder: &Path) -> bool {
     let parent = folder.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     folder.is_dir() || folder.symlink_metadata().is_err() && parent.is_dir() && folder_takes(folder)
 }
 
-/// [`check`] for every `--report`, before any work; none may fall on another.
+/// Runs [`check`] for every `--report` before any work; no two may be the same file.
 pub(super) fn check_reports(paths: &[PathBuf], sources: &Sources) -> Result<(), Diagnostic> {
     if let Some((_, later)) = collision(paths) {
         let fault = Diagnostic::new("output-twice", paths[later].as_path(), "", "is named twice");

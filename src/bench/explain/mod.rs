@@ -34,7 +34,7 @@ pub struct Case {
 pub enum Cause {
     /// A few huge triangles that overlap many cells or boxes.
     HugeTriangles,
-    /// Most prims lie in a small part of the space that the structure divides.
+    /// Cluster of most prims in a small part of the space that the structure divides.
     DenseCluster,
     /// Structure that does more work than another would.
     Structure,

@@ -2,38 +2,38 @@
 //!
 //! | key | what |
 //! |---|---|
-//! | `schema`, `version`, `complete` | `meshray-bench/1`; of meshray; false while the command has not ended |
+//! | `schema`, `version`, `complete` | `meshray-bench/1`; version of meshray; false while the command has not ended |
 //! | `machine` | `cpu`, `cores`, `system`, `simd`, `compiler`, `flags` |
-//! | `settings` | `threads`, `passes`, `seed`, `rays` (most of a class), `slow_tests` (most tests of a class in a slow structure), and what was asked of structures: `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `leaf_size`, `grid_cells`, `max_references` (each null: what suits the kind), `assign`, `mailbox` |
-//! | `models` | one for each model |
-//! | `sweep` | null, or the `parameter` that is swept and its `values` |
-//! | `growth` | null, or how cost grows where the models are a family in growing sizes |
+//! | `settings` | `threads`, `passes`, `seed`, `rays` (maximum per class), `slow_tests` (maximum per class in a slow structure), and the requested parameters of structures: `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `leaf_size`, `grid_cells`, `max_references` (each null for the default of the kind), `assign`, `mailbox` |
+//! | `models` | one object per model |
+//! | `sweep` | null, or the swept `parameter` and its `values` |
+//! | `growth` | null, or the growth of cost if the models are a family in growing sizes |
 //!
-//! A model has `file`, `hash` (xxh3-128 of what was read), `prims` (N), `objects` (that `spheres` and `boxes` bound), `auto`
-//! (null, or what it would choose: `kind`, `why`, and `won_time` and `won_nodes`: how much more the other fast
-//! structure costs in time and nodes, as a share of the chosen one's cost), `picture` (`width`, `height`, `samples`, `depth`,
-//! `view`, `camera`: world-space `eye`, unit `forward` and `up`, `half_height` of what is seen, at a distance of 1 or, where
-//! rays are `parallel`, anywhere), `rays` (by class: `asked`, `kept`), `compared` (rays that more than one structure got),
-//! `identical` (whether all their hits were; null where there are none), `reference`, and `structures`.
+//! A model has `file`, `hash` (xxh3-128 of everything read), `prims` (N), `objects` (as bounded by `spheres` and `boxes`), `auto`
+//! (null, or its choice: `kind`, `why`, and `won_time` and `won_nodes`: the extra cost of the other fast structure in time and
+//! nodes, as a share of the chosen one's cost), `picture` (`width`, `height`, `samples`, `depth`, `view`, `camera`: world-space
+//! `eye`, unit `forward` and `up`, `half_height` of the view, at distance 1 or, if `parallel`, at any distance), `rays` (by
+//! class: `asked`, `kept`), `compared` (rays that more than one structure got), `identical` (whether all their hits were; null if
+//! nothing was compared), `reference`, and `structures`.
 //!
-//! A structure has `accel`, `sampled`, `differing` (rays), `t_b` (seconds: `median`, `min`, `max`, `passes`, or null
-//! without times), `t_tr` (seconds of a ray, or null), V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`, `bytes`,
-//! `break_even` (rays, or null), and `classes`. A class has exact sums (`rays`, `hits`, `tests`, `steps`, `cells`,
-//! `empty_cells`, `volume_tests`, `tests_saved`, `transforms`), `per_ray` (`n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`,
-//! `n_mb`, `n_xf`, `n_min`), `interval` (half the 95 % interval of each but `n_min`, or null when nothing was left out),
-//! `culled`, `differing`, `t_tr` (seconds of a ray, as `t_b`) and `mrays` (1 / `t_tr`). `kept_instances` have their triangles
-//! stored once. `left_out` names structures that could not bear so many prims: slow ones, or those that store each instance by
-//! itself. `pruning` is null, or seconds of processor time of rendering the picture as `usual` and with `everything` on
-//! (each as `t_b`), `saved` (a share) and `same` (whether the pixels were).
+//! A structure has `accel`, `sampled`, `differing` (rays), `t_b` (seconds: `median`, `min`, `max`, `passes`, or null without
+//! times), `t_tr` (seconds per ray, or null), V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`, `bytes`, `break_even` (rays, or null),
+//! and `classes`. A class has exact sums (`rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`,
+//! `tests_saved`, `transforms`), `per_ray` (`n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf`, `n_min`), `interval`
+//! (half the 95 % interval of each but `n_min`, or null if all rays were sent), `culled`, `differing`, `t_tr` (seconds per ray,
+//! as `t_b`) and `mrays` (1 / `t_tr`). A model also has `kept_instances`, whose triangles are stored once; `left_out`, names of
+//! structures not measured because they are too slow for the model or cannot keep instances; and `pruning`: null, or CPU seconds
+//! of rendering the picture as `usual` and with `everything` on (each as `t_b`), `saved` (a share) and `same` (whether the pixels
+//! were).
 //!
-//! Where a parameter is swept, a structure's `setting` has its `value` (null: another parameter rules) and `is_default`,
-//! and the model has `best`: of each `accel` the best `value`, `by` (`t_tr`, or `n_it+n_ts` without times), and `saved`
-//! (share of the default's cost).
+//! For a parameter sweep, a structure's `setting` has its `value` (null: another parameter decides) and `is_default`, and the
+//! model has `best`: for each `accel` the best `value`, `by` (`t_tr`, or `n_it+n_ts` without times), and `saved` (share of the
+//! default's cost).
 //!
-//! `growth` has `family` and `structures`; of each `accel`, `all` (rays of all classes as they were recorded) and
-//! `classes`, with `n_it`, `n_ts`, `t_tr` of each, and in `all` also `bytes` and `t_b`: null, or the power law that fits
-//! over the number of prims, `exponent`, `error` (its standard error, or null for two sizes), `r2` (or null), `factor`
-//! (cost of one prim), `points` (`[prims, cost]`). Keys are only ever added.
+//! `growth` has `family` and `structures`; for each `accel`, `all` (rays of all classes as recorded) and `classes`, with `n_it`,
+//! `n_ts`, `t_tr` of each, and in `all` also `bytes` and `t_b`: null, or the power law fitted over the number of prims,
+//! `exponent`, `error` (its standard error, or null for two sizes), `r2` (or null), `factor` (cost of one prim), `points`
+//! (`[prims, cost]`). Keys are only ever added.
 
 use super::auto::Outcome;
 use super::cost::{Cost, costs};

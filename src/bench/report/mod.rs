@@ -133,7 +133,7 @@ impl Model {
         break_even(row.build.median(), self.seconds_per_ray(row), self.seconds_per_ray(none))
     }
 
-    /// Rays whose answer differed between structures.
+    /// Number of rays whose answer differed between structures.
     pub fn differing(&self) -> u64 {
         self.rows.iter().map(Row::differing).sum()
     }

@@ -1,4 +1,4 @@
-//! The Standard Procedural Databases, measured as they were in 1999.
+//! The Standard Procedural Databases, measured by the rules of 1999.
 //!
 //! E. Haines, *A Proposal for Standard Graphics Environments*, 1987, gives scenes, the rules by which rays are sent ([`rules`]),
 //! and the numbers of rays. V. Havran and F. Sixta, *Comparison of Hierarchical Grids*, and V. Havran, *Comparison of Octree

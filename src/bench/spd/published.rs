@@ -59,7 +59,7 @@ pub struct Figures {
     pub n_v: u64,
     /// Empty cells.
     pub n_ev: u64,
-    /// Objects listed in all cells.
+    /// References: objects listed in all cells.
     pub n_oiv: u64,
     /// Ray/object tests per ray.
     pub n_it: f64,

@@ -63,7 +63,7 @@ pub struct Section {
     pub amount: f64,
     /// Whether the frame is centred, as that of rendered scenes is.
     pub centred: bool,
-    /// Triangles whose three different corners rounding made coincide.
+    /// Triangles of whose three different corners rounding made some coincide.
     pub collapsed: usize,
     /// Rows by intersector, then by structure.
     pub rows: Vec<Row>,

@@ -45,7 +45,7 @@ pub struct Variation {
     pub centred: bool,
     /// Triangles of the mesh; other prims are left out.
     pub shapes: Shapes,
-    /// Triangles whose three different corners rounding made coincide.
+    /// Triangles of whose three different corners rounding made some coincide.
     pub collapsed: usize,
     /// Number of prims that are not triangles.
     pub others: usize,

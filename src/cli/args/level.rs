@@ -1,4 +1,4 @@
-//! The instruction set of the kernels.
+//! Argument for the instruction set of the kernels.
 
 use super::super::parse;
 use crate::math::simd::Level;

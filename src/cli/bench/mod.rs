@@ -1,4 +1,4 @@
-//! `meshray bench`: structures compared on the rays of a real picture, as tables and as report files.
+//! `meshray bench`: compares structures on the rays of a real picture, in tables and report files.
 
 mod args;
 mod gate;

@@ -1,13 +1,13 @@
 //! `meshray diff`: differences of two pictures, in numbers and as a picture.
 //!
 //! # Schema `meshray-diff/1`
-//! One JSON object: `version`, `expected`, `actual` (as typed), `width`, `height`, `space` (`display` or `linear`),
-//! `channels` (3, or 4 with coverage), `rmse`, `relative_rmse`, `bias`, `max`, `worst` (`x`, `y`, `expected`, `actual`:
-//! the values compared), `psnr`, `threshold`, `pixels_over`, `pixels`, `flip` (`mean`, `max`, `worst` with `x` and `y`,
-//! `pixels_per_degree`, and for linear pictures `exposures` with `first`, `last` in stops and `count`), `layers`
-//! (`name`, `rmse`, `max`, `differing`, `of_one` (finite in one file alone, not in `rmse`), `values`; of names, such as
-//! `id.prim`, what differs counts 1), `layers_of_one` (names), `left_out` (what of the files is not read), `broken`
-//! (limits of `--fail-if`). What is not finite is null. Keys are only ever added.
+//! One JSON object: `version`, `expected`, `actual` (as typed), `width`, `height`, `space` (`display` or `linear`), `channels`
+//! (3, or 4 with coverage), `rmse`, `relative_rmse`, `bias`, `max`, `worst` (`x`, `y`, `expected`, `actual`: the values
+//! compared), `psnr`, `threshold`, `pixels_over`, `pixels`, `flip` (`mean`, `max`, `worst` with `x` and `y`, `pixels_per_degree`,
+//! and for linear pictures `exposures` with `first`, `last` in stops and `count`), `layers` (`name`, `rmse`, `max`, `differing`,
+//! `of_one` (finite in only one file, excluded from `rmse`), `values`; in layers of ids, such as `id.prim`, a difference counts
+//! 1), `layers_of_one` (names), `left_out` (parts of the files that are not read), `broken` (limits of `--fail-if`). Non-finite
+//! values are null. Keys are only ever added.
 
 mod args;
 mod limit;

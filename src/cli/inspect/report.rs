@@ -28,7 +28,7 @@ pub(super) struct Report<'a> {
     rounding: f64,
 }
 
-/// Longest list of names that the text shows in full.
+/// Maximum length of a list of names that the text shows in full.
 const SHOWN: usize = 8;
 
 impl<'a> Report<'a> {

@@ -1,4 +1,4 @@
-//! What was typed after `meshray trace`.
+//! Arguments of `meshray trace`.
 
 use super::super::args::{AccelArgs, EyeArgs, ModelArgs};
 use super::super::parse;

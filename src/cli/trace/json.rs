@@ -1,4 +1,4 @@
-//! The tree of rays of a sample as JSON; the schema is described in [`super`].
+//! Ray tree of a sample as JSON; the schema is described in [`super`].
 
 use super::Told;
 use super::words::{hit_surface, in_world, inside, light, object};
@@ -9,7 +9,7 @@ use crate::render::Question;
 use crate::render::ray_tree::{Class, Event, Query};
 use serde_json::{Map, Value, json};
 
-/// One object.
+/// Writes one object.
 pub(super) fn write(told: &Told) -> String {
     let settings = told.settings;
     let value = json!({
@@ -50,7 +50,7 @@ fn query(told: &Told, i: usize) -> Value {
     if i == 0 {
         set("skipped", told.skipped().into());
     }
-    // Infinite where there is no end; JSON has no number for that.
+    // An infinite `t_max` becomes null, as JSON has no infinity.
     set("t_max", Some(query.ray.t_max).filter(|t| t.is_finite()).into());
     if query.after.is_some() {
         set("after", json!({"t": query.after.t, "prim": query.after.prim}));

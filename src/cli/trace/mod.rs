@@ -1,20 +1,20 @@
-//! `meshray trace`: one eye ray told in order, and all that comes of it; as text, as JSON, and as a picture.
+//! `meshray trace`: reports one primary ray step by step, with all its descendants; as text, as JSON, and as a picture.
 //!
 //! # Schema `meshray-trace/1`
-//! One JSON object: `version`, `file`, `hash`, `view`, `width`, `height`, `pixel` (column and row from 0), `sample` (from
-//! 0) of `samples`, `depth`, `accel`, `prims` (N), `radiance` (linear colour of the sample) and `through` (share of the
-//! background behind it), and `ray`, the root of a tree:
+//! One JSON object: `version`, `file`, `hash`, `view`, `width`, `height`, `pixel` (column and row from 0), `sample` (from 0) of
+//! `samples`, `depth`, `accel`, `prims` (N), `radiance` (linear colour of the sample) and `through` (share of the background
+//! behind it), and `ray`, the root of the ray tree:
 //!
 //! | key | what |
 //! |---|---|
-//! | `class`, `question` | `primary`, `shadow`, `reflected`, `refracted`; `closest`, `occluded` (does anything stop its light), `next` (what is behind `after`) |
+//! | `class`, `question` | `primary`, `shadow`, `reflected`, `refracted`; `closest`, `occluded` (is its light blocked), `next` (next hit behind `after`) |
 //! | `origin`, `direction`, `t_min`, `t_max` | the ray, in world space; `t_max` is `null` where it has no end |
-//! | `skipped` | of the eye ray: how far before `origin`, where t is 0, the eye is; more than 0 where it is so far away that rays start just before the scene |
-//! | `light`, `riser`, `after` | what a shadow ray looks for; whether it leads only up to where another one starts, above a surface that stands for a round one; `t` and `prim` of the hit behind which the search went on |
+//! | `skipped` | of the primary ray: distance of the camera before `origin`, where t is 0; positive for a distant camera, whose rays start just before the scene |
+//! | `light`, `riser`, `after` | light of a shadow ray; whether it only leads up to the start of another one, above a surface that stands for a round one; `t` and `prim` of the hit behind which the search continued |
 //! | `counts` | `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf` of this query |
-//! | `hit` | `t`, `u`, `v`, `prim`, `object`, `material`, `position`, `normal` (geometric); `null`: nothing; of `occluded` the first prim found in the way |
-//! | `steps` | in order (of the eye ray; of all with `--all-steps`): `visit` with `at`, `shape`, `box`, `t` (entry and exit) and `prims`; `test` with `outcome` and `t`; `mailbox` (a prim that was not tested again); `volumes`, `transforms` (how many) |
-//! | `rays` | what came of it |
+//! | `hit` | `t`, `u`, `v`, `prim`, `object`, `material`, `position`, `normal` (geometric); `null` for a miss; of `occluded` the first blocking prim found |
+//! | `steps` | in order (of the primary ray; of all with `--all-steps`): `visit` with `at`, `shape`, `box`, `t` (entry and exit) and `prims`; `test` with `outcome` and `t`; `mailbox` (a prim not tested again); `volumes`, `transforms` (counts) |
+//! | `rays` | children of the ray |
 //!
 //! Keys are only ever added.
 
@@ -41,7 +41,7 @@ use crate::render::{Instancing, Job, Settings, View, World};
 pub(super) use args::TraceArgs;
 use std::path::Path;
 
-/// What there is to tell.
+/// Everything to report.
 struct Told<'a> {
     name: &'a str,
     loaded: &'a Loaded,
@@ -49,16 +49,16 @@ struct Told<'a> {
     accel: AccelKind,
     settings: &'a Settings,
     eye: &'a View,
-    /// The view in words.
+    /// Description of the view.
     view: &'a str,
     pixel: (u32, u32),
     sample: u32,
     ray_tree: &'a RayTree,
-    /// Whether steps are listed for every ray.
+    /// Whether to list steps of every ray.
     all_steps: bool,
 }
 
-/// Loads the model, traces the ray and prints what became of it.
+/// Loads the model, traces the ray and prints its report.
 pub(super) fn run(args: &TraceArgs) -> Exit {
     let messages = Messages::new(args.model.messages.into(), args.quiet);
     let checked = check(args).and_then(|look| Ok((look, job::params(&args.params, args.accel.kinds())?)));
@@ -71,7 +71,7 @@ pub(super) fn run(args: &TraceArgs) -> Exit {
     }
 }
 
-/// What the command line says about the picture that the ray is part of.
+/// Settings of the picture that the ray belongs to.
 fn check(args: &TraceArgs) -> Result<Look, UsageError> {
     if let Some(path) = &args.output
         && FileKind::from_path(path).ok() != Some(FileKind::Png)
@@ -109,7 +109,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     let settings = &effective.settings;
     inside(args, settings).map_err(|wrong| messages.wrong(wrong))?;
 
-    // The eye, its light, and the ray.
+    // Camera, lights, and ray.
     let choice = Choice::of(&args.eye, args.up_vector).map_err(|wrong| messages.wrong(wrong))?;
     let size = (settings.width, settings.height);
     let (view, view_phrase) =
@@ -144,7 +144,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     }
 }
 
-/// Whether there is such a pixel with such a sample.
+/// Checks that the picture has the pixel and the sample.
 fn inside(args: &TraceArgs, settings: &Settings) -> Result<(), UsageError> {
     let ((x, y), (width, height)) = (args.pixel, (settings.width, settings.height));
     if x >= width || y >= height {
@@ -170,7 +170,7 @@ fn draw(path: &Path, told: &Told, job: &Job, messages: &Messages) -> Result<Exit
 }
 
 impl Told<'_> {
-    /// Which ray this is.
+    /// Title that identifies the ray.
     fn title(&self) -> String {
         let Settings { width, height, samples, .. } = self.settings;
         format!(
@@ -185,14 +185,14 @@ impl Told<'_> {
         )
     }
 
-    /// How far the eye is behind where its ray starts: far ones start theirs just before the scene.
+    /// Distance of the camera behind the ray's origin: distant cameras start their rays just before the scene. 0 if not skipped.
     fn skipped(&self) -> f64 {
         let Some(ray) = self.ray_tree.queries.first().map(|query| query.ray) else { return 0.0 };
         let View { eye, forward, .. } = self.eye;
-        // Along the view: rays of parallel projections, and those through a lens, start beside the eye.
+        // Measured along the view direction: orthographic rays, and those through a lens, start beside the camera position.
         let distance =
             (words::in_world(self.world, ray.origin) - *eye).dot(*forward) / ray.dir.as_dvec3().dot(*forward);
-        // More than the rounding of an origin.
+        // Ignore the rounding error of the origin.
         if distance > 1e-5 * eye.distance(self.world.center) { distance } else { 0.0 }
     }
 

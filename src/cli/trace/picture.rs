@@ -1,7 +1,7 @@
-//! A picture of one ray: the scene cut open along it and seen from the side, with the boxes that the ray went through.
+//! Picture of one ray: the scene cut open along it and seen from the side, with the boxes that the ray visited.
 //!
-//! The eye stands beside the ray and sees with parallel rays that start on the plane through it, so that nothing stands
-//! before the ray. On the left is all of the scene, on the right what is around the end of the ray.
+//! An orthographic camera looks at the ray from the side. Its rays start on the plane through the ray, so that nothing occludes
+//! it. The left view shows the whole scene, the right one the surroundings of the ray's end.
 
 use super::Told;
 use super::words::{in_world, inside};
@@ -15,18 +15,18 @@ use crate::render::view::Lens;
 use crate::render::{Job, Question, Settings, View, render};
 use crate::scene::UpAxis;
 
-/// Columns and rows of one of the two views.
+/// Width and height of each of the two views, in pixels.
 const SIDE: u32 = 640;
-/// Between the views and around the legend.
+/// Gap between the views and around the legend.
 const GAP: u32 = 12;
-/// Size of letters.
+/// Size of the letters.
 const DOT: u32 = 2;
 
 const PAPER: Color = [20, 22, 26];
 const INK: Color = [235, 235, 235];
 const RAY: Color = [255, 255, 255];
 const INNER: Color = [140, 145, 155];
-// M. Okabe and K. Ito's colours, which people with any kind of colour sight tell apart.
+// M. Okabe and K. Ito's colours, distinguishable with any kind of colour vision.
 const EMPTY: Color = [86, 180, 233];
 const TESTED: Color = [230, 159, 0];
 const HIT: Color = [213, 94, 0];
@@ -34,10 +34,10 @@ const SHADOW: Color = [240, 228, 66];
 const REFLECTED: Color = [0, 158, 115];
 const REFRACTED: Color = [204, 121, 167];
 
-/// Both views and a legend.
+/// Draws both views and a legend.
 pub(super) fn draw(told: &Told, job: &Job) -> Canvas {
     let Some(eye) = told.ray_tree.queries.first() else { return Canvas::filled(1, 1, PAPER) };
-    // Whatever the ray went through: all structures give the same picture, and this one soon.
+    // Backdrop by the default structure, whatever the ray went through: all give the same picture, and this one is fast.
     let (accel, _) = told.world.structure(AccelChoice::Kind(AccelKind::DEFAULT), &AccelParams::DEFAULT);
     let job = &Job { accel: &accel, ..*job };
     let stage = Stage::new(told, eye);
@@ -60,16 +60,16 @@ pub(super) fn draw(told: &Told, job: &Job) -> Canvas {
     canvas
 }
 
-/// What a node or cell was to the ray.
+/// Role of a node or cell for the ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Part {
-    /// It leads to others.
+    /// Inner node.
     Inner,
-    /// It is a leaf without prims.
+    /// Leaf without prims.
     Empty,
-    /// It is a leaf whose prims were tested.
+    /// Leaf whose prims were tested.
     Tested,
-    /// It is the leaf in which the hit was found.
+    /// Leaf in which the hit was found.
     Hit,
 }
 
@@ -86,7 +86,7 @@ impl Part {
     }
 }
 
-/// Everything visited, and what it was.
+/// All visits, with their roles.
 fn parts(eye: &Query) -> Vec<(Visit, Part)> {
     let mut parts: Vec<(Visit, Part)> = Vec::new();
     let mut found = None;
@@ -112,19 +112,19 @@ fn parts(eye: &Query) -> Vec<(Visit, Part)> {
     parts
 }
 
-/// The ray and how it is looked at.
+/// The ray and the camera that shows it.
 struct Stage<'a> {
     told: &'a Told<'a>,
     eye: &'a Query,
     parts: Vec<(Visit, Part)>,
-    /// Where the ray is drawn from and to, world space.
+    /// Ends of the ray as drawn, in world space.
     ends: (DVec3, DVec3),
-    /// The scene's box.
+    /// Bounding box of the scene.
     scene: (DVec3, DVec3),
     view: View,
 }
 
-/// A square part of the plane of the picture, in world units.
+/// Square window of the image plane, in world units.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     middle: DVec2,
@@ -141,7 +141,7 @@ impl<'a> Stage<'a> {
             _ => (origin, origin + dir),
         };
 
-        // From somewhat before the first box to the hit, or out of the last one.
+        // The ray is drawn from somewhat before the first box to the hit, or to the exit from the last box.
         let across = (scene.1 - scene.0).length() / dir.length();
         let spans = || parts.iter().filter_map(|(visit, _)| inside(&visit.extent, &eye.ray));
         let middle = ((scene.0 + scene.1) * 0.5 - origin).dot(dir) / dir.length_squared();
@@ -151,7 +151,7 @@ impl<'a> Stage<'a> {
         let start = (enters.min(end) - 0.15 * across).max(0.0);
         let ends = (origin + dir * start, origin + dir * end);
 
-        // Beside the ray, as upright as it can be, on the side from which more of the scene is behind the ray.
+        // Look across the ray, as upright as possible, from the side on which less of the scene would be cut off.
         let up = if told.loaded.scene.up == UpAxis::Z { DVec3::Z } else { DVec3::Y };
         let across_ray = |up: DVec3| {
             let side = up.cross(dir);
@@ -164,7 +164,7 @@ impl<'a> Stage<'a> {
         Self { told, eye, parts, ends, scene, view }
     }
 
-    /// Where a point lies in the plane of the picture, in world units from the end of the ray.
+    /// Projects a point to the image plane, in world units from the end of the ray.
     fn flat(&self, point: DVec3) -> DVec2 {
         let p = self.view.project(point);
         DVec2::new(p.x, p.y)
@@ -175,7 +175,7 @@ impl<'a> Stage<'a> {
         corners((in_world(self.told.world, bounds.lo), in_world(self.told.world, bounds.hi)))
     }
 
-    /// All of the scene, and the part of the ray before it.
+    /// Window of the whole scene, and the part of the ray before it.
     fn whole(&self) -> Window {
         let (mut lo, mut hi) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         for point in corners(self.scene).into_iter().chain([self.ends.0, self.ends.1]) {
@@ -185,7 +185,7 @@ impl<'a> Stage<'a> {
         Window { middle: (lo + hi) * 0.5, half: (0.52 * (hi - lo).max_element()).max(1e-30) }
     }
 
-    /// The last leaves before the end of the ray, and a little more.
+    /// Window of the last leaves before the end of the ray, with a margin.
     fn near(&self) -> Window {
         let all = self.whole();
         let leaves = self.parts.iter().rev().filter(|(_, part)| *part != Part::Inner).take(4);
@@ -195,7 +195,7 @@ impl<'a> Stage<'a> {
         Window { middle: DVec2::ZERO, half: half.clamp(all.half / 1000.0, all.half / 3.0) }
     }
 
-    /// The scene behind the ray's plane, and everything drawn over it; `frame` is drawn as a frame.
+    /// Draws the scene behind the plane of the ray, and everything over it; `frame` is outlined.
     fn panel(&self, job: &Job, window: Window, frame: Option<Window>) -> Canvas {
         let mut canvas = self.backdrop(job, window);
         let place = |point: DVec2| {
@@ -230,7 +230,7 @@ impl<'a> Stage<'a> {
         canvas
     }
 
-    /// The scene itself, dimmed.
+    /// Renders the scene itself, dimmed.
     fn backdrop(&self, job: &Job, window: Window) -> Canvas {
         let eye = self.view.eye + self.view.right * window.middle.x + self.view.up * window.middle.y;
         let view = View { eye, lens: Lens::orthographic(2.0 * window.half), ..self.view };
@@ -241,7 +241,7 @@ impl<'a> Stage<'a> {
         canvas
     }
 
-    /// The edges of a box, or a sphere's rim.
+    /// Edges of a box, or the silhouette of a sphere.
     fn outline(&self, visit: &Visit) -> Vec<[DVec3; 2]> {
         if let Extent::Ball { center, radius } = visit.extent {
             let middle = self.told.world.center + center;
@@ -256,7 +256,7 @@ impl<'a> Stage<'a> {
         edges.map(|(i, j)| [corner[i], corner[j]]).collect()
     }
 
-    /// The rays that came of the eye's, and those of these.
+    /// Descendants of the primary ray, as coloured lines.
     fn secondary(&self) -> Vec<(Color, [DVec3; 2])> {
         let far = (self.scene.1 - self.scene.0).length();
         let queries = self.told.ray_tree.queries.iter().skip(1);
@@ -299,7 +299,7 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Which ray it is, and what came of it.
+    /// Identity of the ray, and its result.
     fn title(&self) -> [String; 2] {
         let (x, y) = self.told.pixel;
         let c = &self.eye.counts;
@@ -312,7 +312,7 @@ impl<'a> Stage<'a> {
         ]
     }
 
-    /// Colours and what they mean, of what there is.
+    /// Colours that occur in the picture, with their meaning.
     fn legend(&self) -> Vec<(Color, String)> {
         let from = self.flat(self.ends.0);
         let side = match (from.y.abs() > from.x.abs(), from) {
@@ -345,7 +345,7 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// The corners of a box; bit k of the place says on which side of axis k it is.
+/// Corners of a box; bit k of the index selects the upper side on axis k.
 fn corners((lo, hi): (DVec3, DVec3)) -> [DVec3; 8] {
     [0, 1, 2, 3, 4, 5, 6, 7].map(|i: u8| {
         let pick = |k: usize| if i >> k & 1 == 1 { hi[k] } else { lo[k] };

@@ -1,4 +1,4 @@
-//! The tree of rays of a sample as text.
+//! Ray tree of a sample as text.
 
 use super::Told;
 use super::words::{goes_on, hit_surface, in_world, inside, light, object};
@@ -9,7 +9,7 @@ use crate::render::Question;
 use crate::render::ray_tree::{Class, Event, Query};
 use std::fmt::Write;
 
-/// Everything, ray by ray.
+/// Writes everything, ray by ray.
 pub(super) fn write(told: &Told) -> String {
     let mut out = format!("{}\n\n", told.title());
     tell(told, 0, 0, &mut out);
@@ -20,7 +20,7 @@ pub(super) fn write(told: &Told) -> String {
     out
 }
 
-/// A query, its steps, and what came of it, indented by its depth in the tree.
+/// Writes a query, its steps and its children, indented by its depth in the tree.
 fn tell(told: &Told, i: usize, depth: usize, out: &mut String) {
     let query = &told.ray_tree.queries[i];
     let margin = "  ".repeat(depth);
@@ -87,7 +87,7 @@ fn counts(query: &Query) -> String {
     query.counts.named().map(|(name, n)| format!("{name} {n}")).join("  ")
 }
 
-/// A line for each node or cell, with the tests done in it.
+/// One line per node or cell, followed by the tests done in it.
 fn steps(told: &Told, query: &Query) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut runs = Runs::default();
@@ -133,18 +133,18 @@ fn visit(told: &Told, query: &Query, visit: &Visit) -> String {
     format!("{what}{listed}{inside}, {} to {}", place_in(told, bounds.lo), place_in(told, bounds.hi))
 }
 
-/// A place of the centred frame, in the world.
+/// Formats a position of the centred frame in world space.
 fn place_in(told: &Told, place: Vec3) -> String {
     point(in_world(told.world, place), resolution(told))
 }
 
-/// A length that matters for places in the world: a millionth of it.
+/// Distance that is significant for positions: a millionth of the scene's extent.
 fn resolution(told: &Told) -> f64 {
     let (lo, hi) = told.world.bounds;
     1e-6 * (hi - lo).max_element()
 }
 
-/// Tests of one outcome in a row, gathered into one line.
+/// Collects consecutive tests with the same outcome into one line.
 #[derive(Default)]
 struct Runs {
     what: String,
@@ -187,7 +187,7 @@ impl Runs {
     }
 }
 
-/// `3, 5-9, 12`: numbers as they come, runs of neighbours as their ends.
+/// Formats numbers in order, with runs of consecutive ones as ranges: `3, 5-9, 12`.
 fn ranges(numbers: &[u32]) -> String {
     let mut parts: Vec<(u32, u32)> = Vec::new();
     for &n in numbers {
@@ -204,18 +204,18 @@ fn vector(v: Vec3) -> String {
     point(v.as_dvec3(), f64::INFINITY)
 }
 
-/// A point with what is no less than `resolution`, and with six digits at least.
+/// Formats a point precisely enough to distinguish `resolution`, with at least six digits.
 fn point(p: DVec3, resolution: f64) -> String {
     let [x, y, z] = p.to_array().map(|x| resolved(x, resolution));
     format!("({x}, {y}, {z})")
 }
 
-/// Six digits, without zeros behind.
+/// Formats a number with six digits, without trailing zeros.
 fn real(x: f64) -> String {
     resolved(x, f64::INFINITY)
 }
 
-/// A number with as many digits as tell apart what differs by `resolution`, at least six.
+/// Formats a number with enough digits to distinguish values that differ by `resolution`, at least six.
 fn resolved(x: f64, resolution: f64) -> String {
     if x == 0.0 {
         return "0".into();
@@ -224,7 +224,7 @@ fn resolved(x: f64, resolution: f64) -> String {
         return x.to_string();
     }
     let (whole, finest) = (exponent(x), if resolution > 0.0 { exponent(resolution) } else { i32::MAX });
-    // As many as numbers have.
+    // At most as many digits as an `f64` has.
     let digits = (whole - finest).clamp(5, 16);
     let text = match usize::try_from(digits - whole) {
         Ok(places) if whole >= -5 && (whole <= 8 || places > 0) => format!("{x:.places$}"),
@@ -234,7 +234,7 @@ fn resolved(x: f64, resolution: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// The power of ten of the first digit of a number that is not 0.
+/// Decimal exponent of a number that is not 0.
 #[expect(clippy::cast_possible_truncation, reason = "a decimal exponent of f64")]
 fn exponent(x: f64) -> i32 {
     if x.is_finite() { x.abs().log10().floor() as i32 } else { i32::MAX / 2 }

@@ -1,4 +1,4 @@
-//! What was hit and where, in the words of the file.
+//! Describes hits in terms of the file's objects, materials and lights.
 
 use crate::accel::probe::Extent;
 use crate::accel::{Hit, Ray};
@@ -8,23 +8,23 @@ use crate::render::ray_tree::Query;
 use crate::render::{PrimSource, World};
 use crate::scene::Scene;
 
-/// A surface that a ray hit.
+/// Surface point that a ray hit.
 pub(super) struct HitSurface<'a> {
-    /// Name of the object in the file, or its number.
+    /// Name of the object in the file, or its index.
     pub object: String,
-    /// The number of the material.
+    /// Index of the material.
     pub material_number: u32,
-    /// Its name; empty where the file gives none.
+    /// Name of the material; empty if the file gives none.
     pub material: &'a str,
-    /// World space.
+    /// Position in world space.
     pub position: DVec3,
-    /// Unit geometric normal, world space.
+    /// Unit geometric normal in world space.
     pub normal: Vec3,
-    /// Barycentric weights of a triangle's second and third corner.
+    /// Barycentric coordinates for a triangle's second and third corner.
     pub weights: [f32; 2],
 }
 
-/// Where a query's hit lies.
+/// Surface point of a query's hit; `None` for a miss.
 pub(super) fn hit_surface<'a>(loaded: &'a Loaded, world: &World, query: &Query) -> Option<HitSurface<'a>> {
     let scene = &loaded.scene;
     query.hit.is_some().then(|| {
@@ -42,7 +42,7 @@ pub(super) fn hit_surface<'a>(loaded: &'a Loaded, world: &World, query: &Query) 
     })
 }
 
-/// The object that a prim belongs to, by name or number.
+/// Object that a prim belongs to, by name or index.
 pub(super) fn object(scene: &Scene, world: &World, prim: u32) -> String {
     let (kind, number, name) = match world.source(prim) {
         PrimSource::Triangle { instance, .. } | PrimSource::Polygon { instance, .. } => {
@@ -58,7 +58,7 @@ pub(super) fn object(scene: &Scene, world: &World, prim: u32) -> String {
     }
 }
 
-/// The light that a shadow ray looks for, by name or number.
+/// Light that a shadow ray aims at, by name or index.
 pub(super) fn light(scene: &Scene, index: Option<usize>) -> String {
     let named = index.and_then(|i| scene.lights.get(i).map(|light| (i, light.name.as_str())));
     match named {
@@ -68,12 +68,12 @@ pub(super) fn light(scene: &Scene, index: Option<usize>) -> String {
     }
 }
 
-/// A point of the shapes' frame in the world.
+/// Converts a point from the shapes' frame to world space.
 pub(super) fn in_world(world: &World, point: Vec3) -> DVec3 {
     world.center + point.as_dvec3()
 }
 
-/// The part of a ray inside a node or cell, as distances; `None` where it only touches the padding.
+/// Interval of a ray inside a node or cell, as distances; `None` if the ray only touches the padding.
 pub(super) fn inside(extent: &Extent, ray: &Ray) -> Option<(f64, f64)> {
     let (origin, dir, from) = (ray.origin.as_dvec3(), ray.dir.as_dvec3(), f64::from(ray.t_min));
     match *extent {
@@ -87,7 +87,7 @@ pub(super) fn inside(extent: &Extent, ray: &Ray) -> Option<(f64, f64)> {
     }
 }
 
-/// Whether the search went on behind a hit.
+/// Whether the query continued the search behind a hit.
 pub(super) fn goes_on(after: &Hit) -> bool {
     after.is_some()
 }

@@ -1,4 +1,4 @@
-//! What was typed after `meshray verify`.
+//! Arguments of `meshray verify`.
 
 use super::super::args::{ModelArgs, SimdArgs};
 use super::super::parse;

@@ -1,14 +1,13 @@
 //! `meshray verify`: how far a mesh's hits can be trusted, as text or as JSON.
 //!
 //! # Schema `meshray-verify/1`
-//! One JSON object: `version`, `file`, `hash`, `triangles`, `others` (prims that were not judged), `rays` (of each kind,
-//! for each variation), `seed`; `variations`, each with `what`, `amount`, `collapsed` (triangles that rounding
-//! left without three different corners), `disagreements` (rays about which two structures differ), `spawned` (`rays`,
-//! `self_hits`, `slips`, `leaks`, `false_shadows`) and `rows`; a row has `intersector`, `accel` and, for `all` rays and
-//! for each kind of `aims`, `rays`, `hits`, `missed`, `false_hits`, `wrong_order` (numbers of rays) and `t_ulps_max`,
-//! `t_ulps_rms`; `costs` (`intersector`, `ns_per_ray`, the median of passes, `ns_per_ray_min`, `ns_per_ray_max`);
-//! `choose` (an intersector), `trusted`; `unjudged_instances` (further places of meshes, where all of them take more
-//! memory than is allowed). Keys are only ever added.
+//! One JSON object: `version`, `file`, `hash`, `triangles`, `others` (prims not verified), `rays` (per kind and variation),
+//! `seed`; `variations`, each with `what`, `amount`, `collapsed` (triangles of whose three corners rounding made some coincide),
+//! `disagreements` (rays on which two structures differ), `spawned` (`rays`, `self_hits`, `slips`, `leaks`, `false_shadows`) and
+//! `rows`; a row has `intersector`, `accel` and, for `all` rays and for each kind of `aims`, `rays`, `hits`, `missed`,
+//! `false_hits`, `wrong_order` (numbers of rays) and `t_ulps_max`, `t_ulps_rms`; `costs` (`intersector`, `ns_per_ray`, the median
+//! of passes, `ns_per_ray_min`, `ns_per_ray_max`); `choose` (an intersector), `trusted`; `unjudged_instances` (further instances
+//! of meshes, if all of them would exceed the memory limit). Keys are only ever added.
 
 mod args;
 mod report;
@@ -26,7 +25,7 @@ use crate::scene::Scene;
 pub(super) use args::VerifyArgs;
 use std::path::Path;
 
-/// Loads the file, judges it and prints what was found.
+/// Loads the file, verifies it and prints the findings.
 pub(super) fn run(args: &VerifyArgs) -> Exit {
     let messages = Messages::new(args.model.messages.into(), args.quiet);
     panics::guard(&args.model.input.display().to_string(), &messages, || {
@@ -73,9 +72,9 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Result<Exit, Exit> {
     Err(fail(fault.remedy("please report it with the file")))
 }
 
-/// Refuses more rays of a kind than memory that is allowed has room for.
+/// Refuses more rays per kind than fit into the allowed memory.
 fn check_rays(rays: usize, limit: u64) -> Result<(), Diagnostic> {
-    /// A ray, and what is found of it by one test and another.
+    /// A ray, its exact hit, and the answers of tests.
     const OF_RAY: u64 = 256;
     let need = (rays as u64).saturating_mul(OF_RAY);
     if need <= limit {
@@ -85,7 +84,7 @@ fn check_rays(rays: usize, limit: u64) -> Result<(), Diagnostic> {
     Err(Diagnostic::new("too-many-rays", "", "", text).remedy("ask for fewer --rays or raise --max-memory"))
 }
 
-/// What came of the hard rays; `None` where there is nothing to aim at.
+/// Runs the verification; `None` without triangles.
 fn findings(scene: &Scene, plan: &Plan, progress: &Progress) -> Option<Findings> {
     progress.begin("judging");
     let go_on = |done: usize, of: usize| {
@@ -97,8 +96,7 @@ fn findings(scene: &Scene, plan: &Plan, progress: &Progress) -> Option<Findings>
     findings
 }
 
-/// Leaves each mesh in its first place alone, where all places together take more memory than is allowed; how many were left
-/// out.
+/// Drops all but the first instance of each mesh if all together would exceed the memory limit; returns how many were dropped.
 fn reduce(loaded: &mut Loaded, limit: u64, file: &Path) -> Result<usize, Diagnostic> {
     let all = loaded.scene.instances.len();
     if read::check_flattened(loaded, limit, file).is_ok() {

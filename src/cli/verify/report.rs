@@ -1,4 +1,4 @@
-//! The findings of `meshray verify`, shown as text and as JSON.
+//! Findings of `meshray verify`, as text and as JSON.
 
 use super::super::version::SHORT;
 use crate::accel::{AccelKind, IntersectorKind};
@@ -9,21 +9,21 @@ use crate::number::{grouped, hash, short};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
-/// What there is to show.
+/// Contents of the report.
 pub(super) struct Report<'a> {
-    /// The file as typed.
+    /// File name as typed.
     pub name: &'a str,
-    /// Of everything that was read.
+    /// Hash of everything that was read.
     pub hash: u128,
-    /// Instances that were left out.
+    /// Number of instances left out.
     pub unjudged: usize,
-    /// What was asked for.
+    /// Settings of the verification.
     pub plan: &'a Plan,
-    /// What came out.
+    /// Findings.
     pub findings: &'a Findings,
 }
 
-/// What was asked, in a sentence.
+/// Sentence on the rays that were sent.
 pub(super) fn rays(plan: &Plan) -> String {
     format!(
         "Rays at {}, {} of each for the mesh as it is, scaled, and moved far from the origin; times are of one thread",
@@ -33,7 +33,7 @@ pub(super) fn rays(plan: &Plan) -> String {
 }
 
 impl Report<'_> {
-    /// Tables and a verdict.
+    /// Tables and a verdict as text.
     pub(super) fn text(&self) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
@@ -76,7 +76,7 @@ impl Report<'_> {
         writeln!(out, "{}", self.verdict())
     }
 
-    /// Where the tests fail: the default structure, all places and sizes together.
+    /// Table of misses by aim: the default structure, all variations together.
     fn write_aims(&self, out: &mut String) -> std::fmt::Result {
         writeln!(
             out,
@@ -124,7 +124,7 @@ impl Report<'_> {
         Ok(())
     }
 
-    /// Time of a test over that of the exact one.
+    /// Time of a test relative to the exact one.
     fn ratio(&self, test: IntersectorKind) -> f64 {
         let time = |test| {
             let cost = self.findings.costs.iter().find(|c| c.test == test);
@@ -133,9 +133,9 @@ impl Report<'_> {
         time(test) / time(IntersectorKind::Exact)
     }
 
-    /// The least costly test without a wrong answer in enough rays; the exact one where none is.
+    /// Fastest test without a wrong answer in enough rays; the exact one if there is none.
     fn choice(&self) -> IntersectorKind {
-        /// No wrong answer in so many: fewer than 30 in a million, with 95 % confidence.
+        /// No wrong answer in this many rays means fewer than 30 per million, at 95 % confidence.
         const ENOUGH: usize = 100_000;
         let is_trusted = |test: &IntersectorKind| {
             let total = self.findings.total(*test);
@@ -178,7 +178,7 @@ impl Report<'_> {
         )
     }
 
-    /// One line.
+    /// JSON report in one line.
     pub(super) fn json(&self) -> String {
         let f = self.findings;
         let costs: Vec<Value> = f
@@ -234,7 +234,7 @@ fn write_section(out: &mut String, section: &Section) -> std::fmt::Result {
     )
 }
 
-/// Rows of one test that came out the same in several structures, together: most do.
+/// Groups rows of one test with the same results in several structures, as most have.
 fn alike(rows: &[Row]) -> Vec<(Vec<&Row>, Tally)> {
     let mut groups: Vec<(Vec<&Row>, Tally)> = Vec::new();
     for row in rows {
@@ -248,7 +248,7 @@ fn alike(rows: &[Row]) -> Vec<(Vec<&Row>, Tally)> {
     groups
 }
 
-/// What a group of rows is called.
+/// Name of a group of rows.
 fn label(rows: &[&Row]) -> String {
     match rows {
         [row] => row.accel.name().to_owned(),
@@ -287,7 +287,7 @@ fn count(n: usize) -> String {
     grouped(n as u64)
 }
 
-/// Per million.
+/// Formats a rate per million.
 fn rate(n: usize, rays: usize) -> String {
     match Rate::new(n, rays) {
         Rate::Seen(rate) => short(rate),
@@ -301,7 +301,7 @@ mod tests {
     use crate::bench::verify::verify;
     use crate::load::{LoadOptions, load_bytes};
 
-    /// A closed box, twisted so that no face lies along an axis.
+    /// Closed box, twisted so that no face is axis-aligned.
     const BOX: &str = "[[meshes]]\npositions=[[0,0,0],[2,0.1,0],[2,1,0.2],[0,1,0],[0.1,0,1],[2,0,1.1],[2,1.3,1],[0,1,1]]\n\
                        faces=[[0,2,1],[0,3,2],[4,5,6],[4,6,7],[0,1,5],[0,5,4],[3,7,6],[3,6,2],[0,4,7],[0,7,3],[1,2,6],[1,6,5]]\n";
 

@@ -97,7 +97,7 @@ fn legend(max: u64, first: AccelKind) -> String {
         "</linearGradient></defs><rect x=\"{LEFT}\" y=\"2\" width=\"{LONG}\" height=\"14\" fill=\"url(#difference)\"/>"
     );
     let decades = (0..18).map(|d| 10u64.pow(d)).take_while(|&tick| (tick as f64) < 0.4 * max as f64);
-    // Every second decade where all would not fit.
+    // Show every second decade if all would not fit.
     let step = if max > 2000 { 2 } else { 1 };
     let ticks: Vec<u64> = decades.step_by(step).chain([max]).collect();
     let mut tick = |value: i64, sign: &str| {
