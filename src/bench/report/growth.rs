@@ -59,8 +59,8 @@ pub fn kinds(report: &Report) -> Vec<AccelKind> {
 /// Maximum number of sizes shown in a table.
 const COLUMNS: usize = 6;
 
-/// One table per cost: structures as rows, sizes as columns, then the exponent and the factor for ten times the prims. Only
-/// [`COLUMNS`] sizes are shown. The last table has the choices of `auto`.
+/// One table per cost: structures as rows, sizes as columns, then the exponent and the factor for ten times the prims. Of many
+/// sizes only some are shown. The last table has the choices of `auto`.
 pub fn tables(report: &Report) -> Vec<Table> {
     let models = &report.models;
     let shown: Vec<&Model> = match models.len() {
