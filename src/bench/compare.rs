@@ -107,7 +107,7 @@ pub fn compare(
     let pool = threads::pool(plan.threads).ok()?;
     let build = |c: &Candidate| pool.install(|| timed(|| world.structure(AccelChoice::Kind(c.kind), &c.params).0));
     let candidates = plan.candidates();
-    let (whole, sampled) = tasks((world.len(), filters), sets, plan, &candidates, |candidate| build(candidate).0);
+    let (whole, sampled) = tasks(world.len(), filters, sets, plan, &candidates, |candidate| build(candidate).0);
 
     // Build and count each structure once, so that a row exists as soon as possible; then time all in turn.
     let mut rows: Vec<Row> = Vec::new();
@@ -154,7 +154,8 @@ pub fn compare(
 
 /// Tasks of structures that get all rays, and of slow ones.
 fn tasks<'s>(
-    (prims, filters): (usize, Option<&Filters>),
+    prims: usize,
+    filters: Option<&Filters>,
     sets: &[RaySet],
     plan: &Plan,
     candidates: &[Candidate],

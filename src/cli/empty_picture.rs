@@ -13,14 +13,15 @@ const FEW: usize = 10_000;
 /// Warning about the picture of a camera choice, whose name in messages is `view`; `None` if it shows something.
 pub(super) fn warning(
     job: &Job,
-    (choice, view): (&Choice, &str),
+    choice: &Choice,
+    view: &str,
     lens: Option<LensChoice>,
     file: &Path,
 ) -> Option<Diagnostic> {
     if job.world.is_empty() {
         return None;
     }
-    let warning = said(looked_through(job), (choice, lens), job.scene, file)?;
+    let warning = said(looked_through(job), choice, lens, job.scene, file)?;
     Some(Diagnostic { text: format!("{view}: {}", warning.text), ..warning })
 }
 
@@ -50,7 +51,8 @@ pub(super) fn sequence(pictures: usize, file: &Path) -> Diagnostic {
 
 fn said(
     Coverage { rays, hits, shown }: Coverage,
-    (choice, lens): (&Choice, Option<LensChoice>),
+    choice: &Choice,
+    lens: Option<LensChoice>,
     scene: &Scene,
     file: &Path,
 ) -> Option<Diagnostic> {
@@ -90,7 +92,7 @@ mod tests {
 
     fn code(hits: usize, choice: &Choice) -> Option<&'static str> {
         let coverage = Coverage { rays: 40_960, hits, shown: hits > 0 };
-        said(coverage, (choice, None), &Scene::default(), Path::new("a.glb")).map(|warning| warning.code)
+        said(coverage, choice, None, &Scene::default(), Path::new("a.glb")).map(|warning| warning.code)
     }
 
     #[test]

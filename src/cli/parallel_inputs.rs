@@ -60,7 +60,7 @@ pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, run_s
     }
     let mut ended = Ended::WELL;
     if small.len() >= MANY * lanes {
-        ended = side_by_side(job, &small, (lanes, pool), messages, run_state);
+        ended = side_by_side(job, &small, lanes, pool, messages, run_state);
     } else {
         others = job.batches.iter().collect();
     }
@@ -171,7 +171,8 @@ fn guarded(
 fn side_by_side(
     job: &RenderJob,
     batches: &[&Batch],
-    (lanes, pool): (usize, &ThreadPool),
+    lanes: usize,
+    pool: &ThreadPool,
     messages: &Messages,
     run_state: &mut RunState,
 ) -> Ended {

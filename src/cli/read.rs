@@ -64,12 +64,13 @@ pub(super) fn model_as_stored(input: &PathBuf, args: &LoadArgs, messages: &Messa
 /// Refuses a scene whose flattened instances take more memory than allowed: a small file can name millions of them.
 pub(super) fn check_flattened(loaded: &Loaded, limit: u64, file: &Path) -> Result<(), Diagnostic> {
     let bytes = World::flattened_bytes(&loaded.scene);
-    check_stored((loaded, bytes), limit, file, "raise --max-memory")
+    check_stored(loaded, bytes, limit, file, "raise --max-memory")
 }
 
 /// Refuses a scene whose stored instances take more bytes than allowed.
 pub(super) fn check_stored(
-    (loaded, bytes): (&Loaded, u64),
+    loaded: &Loaded,
+    bytes: u64,
     limit: u64,
     file: &Path,
     remedy: &str,
@@ -87,7 +88,8 @@ pub(super) fn check_stored(
 /// Stores a scene in the `wanted` way, or in the `other` way if its flattened instances would exceed the memory limit.
 pub(super) fn placed(
     loaded: &Loaded,
-    (wanted, other): (Instancing, Instancing),
+    wanted: Instancing,
+    other: Instancing,
     limit: u64,
     file: &Path,
     remedy: &str,
@@ -97,7 +99,7 @@ pub(super) fn placed(
         return Ok(as_wanted.world());
     }
     let otherwise = Placing::new(&loaded.scene, other);
-    check_stored((loaded, otherwise.bytes()), limit, file, remedy)?;
+    check_stored(loaded, otherwise.bytes(), limit, file, remedy)?;
     Ok(otherwise.world())
 }
 
@@ -110,7 +112,7 @@ pub(super) fn as_drawn(loaded: &Loaded, how: Instancing, limit: u64, file: &Path
         ),
         Instancing::Keep | Instancing::Auto => (Instancing::Keep, "raise --max-memory"),
     };
-    placed(loaded, (how, other), limit, file, remedy)
+    placed(loaded, how, other, limit, file, remedy)
 }
 
 /// Fault of a model with warnings that is not rendered because of `--strict`.

@@ -225,7 +225,7 @@ fn render_shots(task: &Task, shots: &[&Shot], run_state: &mut RunState) -> Resul
         let (now, later) = left.split_at(same);
         left = later;
         let mut ready =
-            prepare(task, (&first.step, survey.as_ref()), earlier.take(), profile).map_err(|exit| worst.max(exit))?;
+            prepare(task, &first.step, survey.as_ref(), earlier.take(), profile).map_err(|exit| worst.max(exit))?;
         run_state.sources.add(&ready.loaded.facts.files);
         if let Some(path) = job.stats_file() {
             let spared = run_state.sources.spared_by(path, "--stats-file");
@@ -269,7 +269,7 @@ fn beginning(
         return Ok(earlier);
     }
     for step in task.job.frames() {
-        let mut ready = prepare(task, (&step, survey), earlier.take(), profile.take())?;
+        let mut ready = prepare(task, &step, survey, earlier.take(), profile.take())?;
         let mut stage = ready.stage(survey);
         let mut lit = true;
         for shot in shots {
@@ -334,7 +334,8 @@ fn load(job: &RenderJob, batch: &Batch, options: LoadOptions) -> Result<Loaded, 
 /// Loads a scene for a picture, and refuses what cannot or must not be drawn. A frame of a sequence may be empty.
 fn prepare(
     task: &Task,
-    (step, survey): (&Step, Option<&Survey>),
+    step: &Step,
+    survey: Option<&Survey>,
     earlier: Option<Ready>,
     mut profile: Profile,
 ) -> Result<Ready, Exit> {
@@ -414,7 +415,8 @@ fn coarse(loaded: &Loaded, world: &World, file: &Path) -> Option<Diagnostic> {
 fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {
     let held = match loaded.facts.dropped.iter().map(|(_, n)| n).sum::<u64>() {
         0 if !loaded.warnings.is_empty() => "nothing to draw: warnings say what of it is left out".to_owned(),
-        0 => "nothing to draw: it holds no faces, lines or points, or only such as are hidden or scaled to nothing".to_owned(),
+        0 => "nothing to draw: it holds no faces, lines or points, or only such as are hidden or scaled to nothing"
+            .to_owned(),
         n => format!("nothing to draw: all of its {n} faces, lines, points and shapes had to be dropped"),
     };
     let draw_nothing = "--allow-empty draws the background";

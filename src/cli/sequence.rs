@@ -126,7 +126,8 @@ pub(super) fn camera(
     job: &RenderJob,
     shot: &Shot,
     survey: Option<&Survey>,
-    (scene, bounds): (&Scene, &Bounds),
+    scene: &Scene,
+    bounds: &Bounds,
     aspect: f64,
     file: &Path,
 ) -> Result<(Camera, String), Diagnostic> {

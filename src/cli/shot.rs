@@ -61,8 +61,8 @@ pub(super) struct Stage<'a> {
 
 impl Stage<'_> {
     fn camera(&self, task: &Task, shot: &Shot, effective: &Effective) -> Result<(Camera, String), Exit> {
-        let seen = (&self.loaded.scene, self.bounds);
-        let found = sequence::camera(task.job, shot, self.survey, seen, effective.aspect(), task.file());
+        let (scene, aspect) = (&self.loaded.scene, effective.aspect());
+        let found = sequence::camera(task.job, shot, self.survey, scene, self.bounds, aspect, task.file());
         found.map_err(|fault| task.fail(&fault, Exit::Input))
     }
 
@@ -282,7 +282,7 @@ impl Prepared<'_> {
         run_state.shown = run_state.shown || self.is_frame && empty_picture::shows_something(work);
         let warned_empty = match self.is_frame {
             true => None,
-            false => empty_picture::warning(work, (&shot.choice, self.phrase), job.look.lens, self.task.file()),
+            false => empty_picture::warning(work, &shot.choice, self.phrase, job.look.lens, self.task.file()),
         };
         // The warning would be the same for all pictures of a turntable.
         if let Some(warning) = &warned_empty

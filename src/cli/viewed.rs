@@ -38,7 +38,8 @@ pub(super) fn nothing_to_hit(file: &Path) -> Diagnostic {
 /// depend on the camera.
 pub(super) fn eye(
     scene: &mut Scene,
-    (choice, lens): (&Choice, Option<LensChoice>),
+    choice: &Choice,
+    lens: Option<LensChoice>,
     (width, height): (u32, u32),
     file: &Path,
 ) -> Result<(View, String), Diagnostic> {
@@ -66,7 +67,7 @@ pub(super) fn model(
     if world.shapes.is_empty() {
         return Err(fail(nothing_to_hit(file)));
     }
-    let (view, phrase) = self::eye(&mut loaded.scene, (&choice, None), size, file).map_err(fail)?;
+    let (view, phrase) = self::eye(&mut loaded.scene, &choice, None, size, file).map_err(fail)?;
     loaded.scene.background = Some(picture::background(None, &loaded.scene));
     Ok(ViewedModel { loaded, world, view, phrase })
 }

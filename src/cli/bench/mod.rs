@@ -176,7 +176,7 @@ fn files(args: &BenchArgs) -> Result<Vec<(PathBuf, Format)>, UsageError> {
 }
 
 /// Report of a model before any row is measured: its facts, its rays, and the depth of the ray tree.
-fn head(prepared: &Prepared, name: &str, plan: &Plan, (sets, depth): (&[RaySet], u32)) -> Model {
+fn head(prepared: &Prepared, name: &str, plan: &Plan, sets: &[RaySet], depth: u32) -> Model {
     let Prepared { world, settings, .. } = prepared;
     Model {
         name: name.to_owned(),
@@ -219,10 +219,10 @@ impl Bench<'_> {
             let fault = Diagnostic::new("threads", &name, "", "the rays could not be recorded");
             self.messages.fail(&fault, Exit::Failed)
         })?;
-        let head = Model { left_out, ..head(&prepared, &name, &plan, (&sets, depth)) };
+        let head = Model { left_out, ..head(&prepared, &name, &plan, &sets, depth) };
         report.models.push(head);
 
-        let mut worst = self.rows(report, &prepared, &plan, (&name, &sets))?;
+        let mut worst = self.rows(report, &prepared, &plan, &name, &sets)?;
         if plan.passes > 0 && plan.sweep.is_none() && report.family.is_none() {
             self.messages.info("progress", format!("{name}: rendering with every code path on"));
             let pruning = prepared.pruning(plan.passes);
@@ -240,7 +240,8 @@ impl Bench<'_> {
         report: &mut Report,
         prepared: &Prepared,
         plan: &Plan,
-        (name, sets): (&str, &[RaySet]),
+        name: &str,
+        sets: &[RaySet],
     ) -> Result<Exit, Exit> {
         let mut written = Exit::Done;
         let mut done = 0;

@@ -60,8 +60,7 @@ impl Subject {
     fn world(&self, loaded: &Loaded, limit: u64) -> Result<World, Diagnostic> {
         match self {
             Self::File(path) => {
-                let ways = (Instancing::Flatten, Instancing::Keep);
-                read::placed(loaded, ways, limit, path, "raise --max-memory")
+                read::placed(loaded, Instancing::Flatten, Instancing::Keep, limit, path, "raise --max-memory")
             }
             Self::Generated(..) => Ok(World::new(&loaded.scene)),
         }
@@ -104,7 +103,7 @@ impl Prepared {
         if world.is_empty() {
             return Err(messages.fail(&viewed::nothing_to_hit(input), Exit::Input));
         }
-        let found = viewed::eye(&mut loaded.scene, (&choice, None), args.size, input);
+        let found = viewed::eye(&mut loaded.scene, &choice, None, args.size, input);
         let (view, view_phrase) = found.map_err(|fault| messages.fail(&fault, Exit::Input))?;
         let usual = viewed::settings(args.size, args.depth, &loaded.scene.hints);
         let settings = Settings { samples: args.samples, seed: args.seed, ..usual };

@@ -351,9 +351,14 @@ mod tests {
         let places = (0..40).map(|i| DAffine3::from_translation(DVec3::X * f64::from(i) * 10.0));
         let placed = |world_from_object| Instance { name: String::new(), mesh: 0, world_from_object };
         loaded.scene.instances = places.map(placed).collect();
+        // A line, which has no faces in the file, behind them.
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+        loaded.scene.meshes.push(Mesh { positions, triangles: vec![[0, 1, 2]], is_wire: true, ..Mesh::default() });
+        let world_from_object = DAffine3::from_translation(DVec3::Y * 50.0);
+        loaded.scene.instances.push(Instance { name: String::new(), mesh: 1, world_from_object });
         let [whole, by_object] = [u64::MAX, 1 << 20].map(|limit| report(&loaded, limit));
         assert!(!whole.world.instanced.is_empty(), "kept once");
-        assert_eq!(whole.world.triangles() as usize, 40 * triangles);
+        assert_eq!(whole.world.triangles() as usize, 40 * triangles + 1);
         assert_eq!(by_object.topology, Topology { by_object: true, ..whole.topology });
         assert!(whole.topology.edges > 0 && by_object.text().contains("each instance by itself"));
     }

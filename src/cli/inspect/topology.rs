@@ -32,21 +32,16 @@ impl Topology {
         placed.for_each(|placed| times[placed.object as usize] += 1);
         let objects = world.instanced.objects().iter().zip(times).filter(|(_, times)| *times > 0);
         let objects = objects.map(|(object, times)| Self::of_faces(object.shapes(), |_| true).times(times));
-        // If there are kept objects, prims of `world.shapes` are numbered differently, so that [`is_wire`] does not apply.
-        let stored = match world.instanced.is_empty() {
-            true => Self::of(scene, world),
-            false => Self::of_faces(&world.shapes, |_| true),
-        };
-        let all = objects.fold(stored, Self::plus);
+        let all = objects.fold(Self::of(scene, world), Self::plus);
         Self { by_object: true, ..all }
     }
 
-    /// Counts the faces of a scene with flattened instances; points and lines have none.
+    /// Counts the faces of shapes that are not of kept instances; points and lines have none.
     pub(super) fn of(scene: &Scene, world: &World) -> Self {
         if !scene.meshes.iter().any(|mesh| mesh.is_wire) {
             return Self::of_faces(&world.shapes, |_| true);
         }
-        Self::of_faces(&world.shapes, |prim| !is_wire(scene, world, prim))
+        Self::of_faces(&world.shapes, |stored| !is_wire(scene, world, world.instanced.number(stored)))
     }
 
     fn times(self, n: u64) -> Self {

@@ -113,7 +113,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     let choice = Choice::of(&args.eye, args.up_vector).map_err(|wrong| messages.wrong(wrong))?;
     let size = (settings.width, settings.height);
     let (view, view_phrase) =
-        viewed::eye(&mut loaded.scene, (&choice, look.lens), size, file).map_err(fail(Exit::Input))?;
+        viewed::eye(&mut loaded.scene, &choice, look.lens, size, file).map_err(fail(Exit::Input))?;
     loaded.scene.background = Some(background(look.background, &loaded.scene));
     let (accel, _) = world.structure_for(settings.fewest_eye_rays(), args.accel, params);
     let textures = TextureStore::new(&loaded.scene);

@@ -45,7 +45,8 @@ pub(super) fn is_required(root: &Root) -> bool {
 pub(super) fn decode_views(root: &Root, buffers: &Buffers, file: &Path, budget: &mut Budget) -> Decoded {
     let views = root.buffer_views.iter().enumerate();
     let compressed = views.filter_map(|(i, view)| Some((Task { buffers, file, i, view }, extension(view)?)));
-    let planned: Vec<_> = compressed.map(|(task, extension)| (task.i, task.plan(extension, budget))).collect();
+    let planned: Vec<_> =
+        compressed.map(|(task, (name, properties))| (task.i, task.plan(name, properties, budget))).collect();
     let decoded = planned.into_par_iter().map(|(i, plan)| (i, plan.and_then(Plan::run)));
     decoded.collect()
 }
@@ -70,7 +71,8 @@ impl<'a> Task<'a> {
     /// Checks everything that can be checked before decoding, and charges the memory.
     fn plan(
         &self,
-        (name, properties): (&'static str, &Map<String, Value>),
+        name: &'static str,
+        properties: &Map<String, Value>,
         budget: &mut Budget,
     ) -> Result<Plan<'a>, Diagnostic> {
         let bytes = self.stream(name, properties)?;

@@ -251,7 +251,7 @@ impl Loading<'_> {
             (None, _) => 0,
         };
         let Some(animation) = animations.get(number) else { return Ok(Pose::default()) };
-        let pose = animation::play(reader, graph, (number, animation), moment.time, budget, self.report)
+        let pose = animation::play(reader, graph, number, animation, moment.time, budget, self.report)
             .map_err(|over| self.too_large("an animation", over))?;
         facts.shown = Some((number, moment.time));
         facts.changes_materials = animation.changes_materials();

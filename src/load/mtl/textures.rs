@@ -164,12 +164,7 @@ impl Textures {
     }
 
     /// Makes a texture of `take`, transformed and wrapped by the options of `map`.
-    fn texture(
-        &mut self,
-        take: Take,
-        map: &Map,
-        (limits, budget): (&Limits, &mut Budget),
-    ) -> Result<TextureRef, Unusable> {
+    fn texture(&mut self, take: Take, map: &Map, limits: &Limits, budget: &mut Budget) -> Result<TextureRef, Unusable> {
         let bitmap = self.pictures.take(take, limits, budget)?;
         let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
         let wanted = Texture { bitmap, sampler: Sampler { wrap_u: wrap, wrap_v: wrap, ..Sampler::default() } };
@@ -241,7 +236,7 @@ impl Mapper<'_> {
 
     /// Makes a texture of `take` by the options of `map`; `None`, with a warning, if it takes too much memory.
     fn texture(&mut self, take: Take, map: &Map) -> Option<TextureRef> {
-        let made = self.textures.texture(take, map, (self.limits, self.budget));
+        let made = self.textures.texture(take, map, self.limits, self.budget);
         let warn = |why: Unusable| {
             let name = self.textures.pictures.name(take);
             self.warnings.push(why.warning(&name, self.library.file, &map.line.to_string()));

@@ -65,7 +65,8 @@ impl Aims {
 pub(in crate::load::gltf) fn play(
     reader: Reader,
     graph: &Graph,
-    (number, animation): (usize, &Animation),
+    number: usize,
+    animation: &Animation,
     time: f64,
     budget: &mut Budget,
     report: &mut Report,
