@@ -81,7 +81,7 @@ impl BitSet {
     pub fn filled(len: usize, value: bool) -> Self {
         let mut words = vec![if value { u64::MAX } else { 0 }; len.div_ceil(64)];
         // Bits beyond the last read as set.
-        if let Some(last) = words.last_mut().filter(|_| len % 64 > 0) {
+        if let Some(last) = words.last_mut().filter(|_| !len.is_multiple_of(64)) {
             *last |= u64::MAX << (len % 64);
         }
         Self { words }
