@@ -47,14 +47,14 @@ impl Sum for Spent {
 /// A running watch.
 #[derive(Clone, Copy, Debug)]
 pub struct Stopwatch {
-    whose: Whose,
+    whose: Scope,
     wall: Instant,
     cpu: Duration,
 }
 
 /// Whose processor time a watch measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Whose {
+enum Scope {
     Process,
     Thread,
 }
@@ -62,15 +62,15 @@ enum Whose {
 impl Stopwatch {
     /// Starts a watch for the time of all threads together.
     pub fn of_all_threads() -> Self {
-        Self::start(Whose::Process)
+        Self::start(Scope::Process)
     }
 
     /// Starts a watch for the time of this thread; call [`Self::read`] on the same thread.
     pub fn of_this_thread() -> Self {
-        Self::start(Whose::Thread)
+        Self::start(Scope::Thread)
     }
 
-    fn start(whose: Whose) -> Self {
+    fn start(whose: Scope) -> Self {
         Self { whose, wall: Instant::now(), cpu: processor(whose) }
     }
 
@@ -90,29 +90,29 @@ impl Stopwatch {
 
 /// Processor time of the process so far, from before its first instruction.
 pub fn processor_since_start() -> Duration {
-    processor(Whose::Process)
+    processor(Scope::Process)
 }
 
 #[cfg(unix)]
-fn processor(whose: Whose) -> Duration {
+fn processor(whose: Scope) -> Duration {
     use nix::time::{ClockId, clock_gettime};
     let time = clock_gettime(match whose {
-        Whose::Process => ClockId::CLOCK_PROCESS_CPUTIME_ID,
-        Whose::Thread => ClockId::CLOCK_THREAD_CPUTIME_ID,
+        Scope::Process => ClockId::CLOCK_PROCESS_CPUTIME_ID,
+        Scope::Thread => ClockId::CLOCK_THREAD_CPUTIME_ID,
     });
     time.map(Duration::from).unwrap_or_default()
 }
 
 /// Processor time; for a thread the wall-clock time, as Windows counts threads in whole ticks, about sixty-four a second.
 #[cfg(not(unix))]
-fn processor(whose: Whose) -> Duration {
+fn processor(whose: Scope) -> Duration {
     static FIRST: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
     match whose {
-        Whose::Thread => FIRST.elapsed(),
+        Scope::Thread => FIRST.elapsed(),
         #[cfg(windows)]
-        Whose::Process => cpu_time::ProcessTime::now().as_duration(),
+        Scope::Process => cpu_time::ProcessTime::now().as_duration(),
         #[cfg(not(windows))]
-        Whose::Process => Duration::ZERO,
+        Scope::Process => Duration::ZERO,
     }
 }
 

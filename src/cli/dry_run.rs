@@ -19,27 +19,33 @@ use std::path::Path;
 
 /// Identity of a picture: input, view and output.
 #[derive(Clone, Copy)]
-pub(super) struct Which<'a> {
+pub(super) struct PictureId<'a> {
     pub file: &'a Path,
     pub view: &'a str,
     pub target: &'a Target,
 }
 
 /// Formats the forecast of one picture, which itself takes `picture` bytes of memory.
-pub(super) fn told(which: Which, work: &Job, forecast: &Forecast, picture: u64, format: Option<StatsFormat>) -> String {
-    let told = Told { which, work, forecast, memory: peak_memory().map(|held| held + picture) };
+pub(super) fn told(
+    which: PictureId,
+    work: &Job,
+    forecast: &Forecast,
+    picture: u64,
+    format: Option<StatsFormat>,
+) -> String {
+    let told = ForecastReport { which, work, forecast, memory: peak_memory().map(|held| held + picture) };
     if format == Some(StatsFormat::Json) { told.json() } else { told.text() }
 }
 
-struct Told<'a> {
-    which: Which<'a>,
+struct ForecastReport<'a> {
+    which: PictureId<'a>,
     work: &'a Job<'a>,
     forecast: &'a Forecast,
     /// Peak memory of the whole run: the peak so far, plus the picture.
     memory: Option<u64>,
 }
 
-impl Told<'_> {
+impl ForecastReport<'_> {
     /// Wall-clock time of all threads, if nothing else runs on the processors.
     fn wall(&self) -> Interval {
         let side_by_side = rayon::current_num_threads().min(threads::available()).max(1) as f64;

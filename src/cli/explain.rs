@@ -32,7 +32,7 @@ pub(super) fn run(args: &ExplainArgs) -> Exit {
 }
 
 /// Contents of the report.
-struct Told<'a> {
+struct ExplainReport<'a> {
     name: &'a str,
     hash: u128,
     view: &'a str,
@@ -53,7 +53,7 @@ fn judge(args: &ExplainArgs, params: AccelParams, name: &str, messages: &Message
         !interrupt::raised()
     };
     let (usual, findings) = explain(&case, going).ok_or(Exit::Interrupted)?;
-    let told = Told {
+    let told = ExplainReport {
         name,
         hash: loaded.facts.hash,
         view: &phrase,
@@ -66,7 +66,7 @@ fn judge(args: &ExplainArgs, params: AccelParams, name: &str, messages: &Message
     Ok(Exit::Done)
 }
 
-impl Told<'_> {
+impl ExplainReport<'_> {
     fn text(&self) -> String {
         let Settings { width, height, .. } = self.case.settings;
         let pixels = f64::from(width) * f64::from(height);

@@ -4,7 +4,7 @@ use super::archives::on_disk;
 use super::args::{AccelArgs, FileType, MessageFormat, RenderArgs, SpaceArg, StatsFormat};
 use super::camera::{self, Choice, LensChoice};
 use super::output_name::{Fields, Naming};
-use super::outputs::{self, Beside, Growth, Target};
+use super::outputs::{self, Growth, SideFiles, Target};
 use super::parse::Env;
 use super::sampling::SamplingArgs;
 use super::sequence::{self, Sequence, Step};
@@ -206,8 +206,8 @@ impl RenderJob {
     }
 
     /// Files written beside each picture.
-    pub(super) fn beside(&self) -> Beside<'_> {
-        Beside { heatmaps: &self.heatmaps, partial: self.keep_partial }
+    pub(super) fn beside(&self) -> SideFiles<'_> {
+        SideFiles { heatmaps: &self.heatmaps, partial: self.keep_partial }
     }
 
     /// File of the statistics, if any.
@@ -327,8 +327,8 @@ fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -
     Ok(batches)
 }
 
-fn beside(args: &RenderArgs) -> Beside<'_> {
-    Beside { heatmaps: &args.heatmap, partial: args.keep_partial }
+fn beside(args: &RenderArgs) -> SideFiles<'_> {
+    SideFiles { heatmaps: &args.heatmap, partial: args.keep_partial }
 }
 
 /// Refuses sizes that a file type cannot hold, and flags that only one file type honours.

@@ -96,7 +96,7 @@ fn name_again(args: &RenderArgs) -> Option<String> {
 
 /// Files written beside each picture, named after it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Beside<'a> {
+pub(super) struct SideFiles<'a> {
     /// Costs shown by heat maps.
     pub heatmaps: &'a [Cost],
     /// Whether an interrupted picture is kept.
@@ -116,14 +116,14 @@ pub(super) fn partial(picture: &Target) -> Option<Target> {
 }
 
 /// Destinations of a picture and of the files beside it.
-pub(super) fn of(shot: &Shot, beside: Beside) -> Vec<Target> {
+pub(super) fn of(shot: &Shot, beside: SideFiles) -> Vec<Target> {
     let maps = beside.heatmaps.iter().filter_map(|&cost| heat_map(&shot.target, cost));
     let partial = beside.partial.then(|| partial(&shot.target)).flatten();
     std::iter::once(shot.target.clone()).chain(maps).chain(partial).collect()
 }
 
 /// Files of these pictures and those beside them.
-fn files<'a>(shots: impl Iterator<Item = &'a Shot>, beside: Beside) -> Vec<PathBuf> {
+fn files<'a>(shots: impl Iterator<Item = &'a Shot>, beside: SideFiles) -> Vec<PathBuf> {
     shots.flat_map(|shot| of(shot, beside)).filter_map(|target| target.path().map(Path::to_path_buf)).collect()
 }
 
@@ -184,7 +184,7 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), UsageError> {
 }
 
 /// Checks that the files beside pictures do not collide.
-pub(super) fn check_beside(batches: &[Batch], beside: Beside) -> Result<(), UsageError> {
+pub(super) fn check_beside(batches: &[Batch], beside: SideFiles) -> Result<(), UsageError> {
     let shots = || batches.iter().flat_map(|b| &b.shots);
     let heatmaps = beside.heatmaps;
     if let Some(twice) = heatmaps.iter().enumerate().find(|(i, cost)| heatmaps[..*i].contains(cost)) {
@@ -209,7 +209,7 @@ pub(super) fn check_beside(batches: &[Batch], beside: Beside) -> Result<(), Usag
 }
 
 /// Checks that the statistics do not replace a picture or a file beside it.
-pub(super) fn check_stats_file(stats: Option<&Stats>, batches: &[Batch], beside: Beside) -> Result<(), UsageError> {
+pub(super) fn check_stats_file(stats: Option<&Stats>, batches: &[Batch], beside: SideFiles) -> Result<(), UsageError> {
     let Some(file) = stats.and_then(|stats| stats.file.as_deref()) else { return Ok(()) };
     let names = files(batches.iter().flat_map(|b| &b.shots), beside);
     let target = output_name::identity(file);

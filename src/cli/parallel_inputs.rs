@@ -36,12 +36,12 @@ const LOOKED_AT: usize = 100_000;
 
 /// Outcome of a run: the worst exit of all inputs, and the number of failed ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Ended {
+pub(super) struct RunOutcome {
     pub worst: Exit,
     pub failed: usize,
 }
 
-impl Ended {
+impl RunOutcome {
     const WELL: Self = Self { worst: Exit::Done, failed: 0 };
 
     fn and(&mut self, exit: Exit) {
@@ -51,14 +51,14 @@ impl Ended {
 }
 
 /// Renders all inputs until a signal comes: small ones in parallel if that pays, then the others one by one.
-pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, run_state: &mut RunState) -> Ended {
+pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, run_state: &mut RunState) -> RunOutcome {
     let lanes = if may_go_side_by_side(job) { pool.current_num_threads() } else { 1 };
     let (mut small, mut others) = (Vec::new(), Vec::new());
     let mut sizes = Sizes { has_size: job.look.size.is_some(), beside: HashMap::new() };
     for batch in &job.batches {
         if lanes > 1 && sizes.are_small(batch) && spares_others(batch) { &mut small } else { &mut others }.push(batch);
     }
-    let mut ended = Ended::WELL;
+    let mut ended = RunOutcome::WELL;
     if small.len() >= MANY * lanes {
         ended = side_by_side(job, &small, lanes, pool, messages, run_state);
     } else {
@@ -175,11 +175,11 @@ fn side_by_side(
     pool: &ThreadPool,
     messages: &Messages,
     run_state: &mut RunState,
-) -> Ended {
+) -> RunOutcome {
     let progress = Progress::new(&format!("{} inputs", batches.len()), messages, job.quiet, false);
     progress.begin("rendering");
     let waiting = batches.iter().map(|_| None).collect();
-    let state = State { next: 0, finished: 0, told: 0, waiting, run_state, ended: Ended::WELL };
+    let state = State { next: 0, finished: 0, told: 0, waiting, run_state, ended: RunOutcome::WELL };
     let queue = Queue { job, batches, messages, progress, state: Mutex::new(state) };
     std::thread::scope(|scope| {
         for _ in 0..lanes {
@@ -214,7 +214,7 @@ struct State<'s> {
     /// Results of finished inputs, until all inputs before them are reported.
     waiting: Vec<Option<Finished>>,
     run_state: &'s mut RunState,
-    ended: Ended,
+    ended: RunOutcome,
 }
 
 /// Results of an input.
@@ -271,7 +271,7 @@ impl<'a, 's> Queue<'a, 's> {
     }
 
     /// Reports the results that follow inputs left unfinished because of a signal.
-    fn end(self) -> Ended {
+    fn end(self) -> RunOutcome {
         self.progress.finish();
         let mut state = self.state();
         for finished in state.waiting.iter_mut().filter_map(Option::take).collect::<Vec<_>>() {

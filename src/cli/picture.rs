@@ -121,7 +121,7 @@ pub(super) fn before(background: Option<Background>, mut output: Output) -> Outp
 
 /// Additional data gathered for a picture.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Behind {
+pub(super) struct PictureData {
     /// Number of costs per pixel.
     pub costs: usize,
     /// Whether the picture is rendered once more, to count.
@@ -161,7 +161,7 @@ pub(super) fn bytes_of_rays(settings: &Settings, rays: f64) -> u64 {
 
 /// Peak memory in bytes of a picture until it is in its file: all data of its pixels, twice while it is counted or another is
 /// rendered beside it; then the samples as stored, and the encoded file, which may be hardly smaller.
-pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: Behind) -> u64 {
+pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: PictureData) -> u64 {
     /// Bytes per cost of a pixel: those of its tile, five channels, copies and sums.
     const COST: u64 = 128;
     let Effective { settings, output, .. } = effective;
@@ -193,7 +193,7 @@ pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: Behind) -> u6
 }
 
 /// Returns a fault if the picture alone needs more memory than allowed.
-pub(super) fn too_large(effective: &Effective, kind: FileKind, behind: Behind, limit: u64) -> Option<Diagnostic> {
+pub(super) fn too_large(effective: &Effective, kind: FileKind, behind: PictureData, limit: u64) -> Option<Diagnostic> {
     let settings = &effective.settings;
     beyond((settings.width, settings.height), bytes(effective, kind, behind), limit)
 }
@@ -322,9 +322,9 @@ mod tests {
     #[test]
     fn a_picture_beyond_the_memory_allowed_is_refused() {
         let big = Effective::new(&Look { size: Some((65_535, 65_535)), ..Look::default() }, &Scene::default()).unwrap();
-        assert!(too_large(&big, FileKind::Png, Behind::default(), 8 << 30).is_some());
+        assert!(too_large(&big, FileKind::Png, PictureData::default(), 8 << 30).is_some());
         let usual = Effective::new(&Look::default(), &Scene::default()).unwrap();
-        assert!(too_large(&usual, FileKind::Exr, Behind { costs: 4, counted: true }, 8 << 30).is_none());
+        assert!(too_large(&usual, FileKind::Exr, PictureData { costs: 4, counted: true }, 8 << 30).is_none());
     }
 
     #[test]
@@ -333,7 +333,7 @@ mod tests {
             let mut effective =
                 Effective::new(&Look { size: Some(size), ..Look::default() }, &Scene::default()).unwrap();
             effective.settings.sampling = Sampling::Adaptive(Adaptive { min_levels, ..Adaptive::default() });
-            bytes(&effective, FileKind::Png, Behind::default())
+            bytes(&effective, FileKind::Png, PictureData::default())
         };
         // Measured: 6.5 GB, and 2.6 GB with four bands.
         assert!((6_000_000_000..9_000_000_000).contains(&of((256, 256), 4)), "{}", of((256, 256), 4));

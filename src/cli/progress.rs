@@ -16,12 +16,12 @@ const TELLING: Duration = Duration::from_secs(1);
 
 /// Progress of one picture.
 pub(super) struct Progress<'a> {
-    how: How<'a>,
+    how: Display<'a>,
     /// Whether a signal ends the render, so that its tiles can be kept.
     cancellable: bool,
 }
 
-enum How<'a> {
+enum Display<'a> {
     Silent,
     Bar { bar: ProgressBar, messages: &'a Messages },
     Lines { name: String, messages: &'a Messages, stage: Mutex<Stage> },
@@ -39,13 +39,13 @@ impl<'a> Progress<'a> {
         use std::io::IsTerminal;
         let now = Instant::now();
         let how = if silent {
-            How::Silent
+            Display::Silent
         } else if std::io::stderr().is_terminal() {
             let bar = messages.bars.add(ProgressBar::new_spinner());
             bar.set_prefix(name.to_owned());
-            How::Bar { bar, messages }
+            Display::Bar { bar, messages }
         } else {
-            How::Lines {
+            Display::Lines {
                 name: name.into(),
                 messages,
                 stage: Mutex::new(Stage { doing: "", started: now, last_line: now }),
@@ -57,28 +57,28 @@ impl<'a> Progress<'a> {
     /// Begins a stage of unknown length: `loading`, `building`.
     pub(super) fn stage(&self, what: &str) {
         match &self.how {
-            How::Silent => {}
-            How::Bar { bar, .. } => {
+            Display::Silent => {}
+            Display::Bar { bar, .. } => {
                 bar.set_style(style("{spinner} {prefix}: {msg} {elapsed}"));
                 bar.set_message(what.to_owned());
                 bar.enable_steady_tick(Duration::from_millis(120));
             }
-            How::Lines { .. } => {}
+            Display::Lines { .. } => {}
         }
     }
 
     /// Begins work of known length: `rendering`, `judging`; [`Self::advance`] reports its progress.
     pub(super) fn begin(&self, doing: &'static str) {
         match &self.how {
-            How::Silent => {}
-            How::Bar { bar, .. } => {
+            Display::Silent => {}
+            Display::Bar { bar, .. } => {
                 bar.disable_steady_tick();
                 bar.set_position(0);
                 bar.reset_eta();
                 bar.set_message(doing);
                 bar.set_style(style("{prefix}: {msg} [{wide_bar}] {percent:>3} %  {elapsed} (ETA {eta})"));
             }
-            How::Lines { stage, .. } => {
+            Display::Lines { stage, .. } => {
                 if let Ok(mut stage) = stage.lock() {
                     (stage.doing, stage.started) = (doing, Instant::now());
                 }
@@ -89,13 +89,13 @@ impl<'a> Progress<'a> {
     /// Reports that work of unknown length continues.
     fn goes_on(&self, doing: &'static str) {
         match &self.how {
-            How::Silent => {}
-            How::Bar { bar, .. } => {
+            Display::Silent => {}
+            Display::Bar { bar, .. } => {
                 if bar.message() != doing {
                     self.stage(doing);
                 }
             }
-            How::Lines { name, messages, stage } => {
+            Display::Lines { name, messages, stage } => {
                 let Ok(mut stage) = stage.try_lock() else { return };
                 if stage.last_line.elapsed() >= LINE_EVERY {
                     stage.last_line = Instant::now();
@@ -109,15 +109,15 @@ impl<'a> Progress<'a> {
     /// Reports that `done` of `total` parts are done.
     pub(super) fn advance(&self, done: usize, total: usize) {
         match &self.how {
-            How::Silent => {}
-            How::Bar { bar, .. } => {
+            Display::Silent => {}
+            Display::Bar { bar, .. } => {
                 bar.set_length(total as u64);
                 // Workers report out of order; the bar never moves back.
                 if done as u64 > bar.position() {
                     bar.set_position(done as u64);
                 }
             }
-            How::Lines { name, messages, stage } => {
+            Display::Lines { name, messages, stage } => {
                 // If another worker is writing, there is nothing to add.
                 let Ok(mut stage) = stage.try_lock() else { return };
                 let elapsed = stage.started.elapsed();
@@ -131,7 +131,7 @@ impl<'a> Progress<'a> {
 
     /// Removes the display.
     pub(super) fn finish(&self) {
-        if let How::Bar { bar, messages } = &self.how {
+        if let Display::Bar { bar, messages } = &self.how {
             bar.finish_and_clear();
             messages.bars.remove(bar);
         }

@@ -46,7 +46,7 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
             return messages.fail(&fault, Exit::Failed);
         }
     }
-    let parallel_inputs::Ended { worst, failed } = parallel_inputs::run(job, &pool, messages, &mut run_state);
+    let parallel_inputs::RunOutcome { worst, failed } = parallel_inputs::run(job, &pool, messages, &mut run_state);
     if interrupt::raised() {
         return Exit::Interrupted;
     }

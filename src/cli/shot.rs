@@ -5,7 +5,7 @@ use super::job::{Batch, RenderJob, Shot};
 use super::message::{Messages, Severity};
 use super::meter::{self, Metered};
 use super::outputs;
-use super::picture::{self, Behind, Effective};
+use super::picture::{self, Effective, PictureData};
 use super::profile::Profile;
 use super::progress::Progress;
 use super::render::RunState;
@@ -117,8 +117,8 @@ fn is_metered(effective: &Effective, shot: &Shot, scene: &Scene) -> bool {
 }
 
 /// Additional data gathered for each picture.
-fn behind(job: &RenderJob) -> Behind {
-    Behind { costs: cost_layers::wanted(job).len(), counted: job.stats.is_some() }
+fn behind(job: &RenderJob) -> PictureData {
+    PictureData { costs: cost_layers::wanted(job).len(), counted: job.stats.is_some() }
 }
 
 /// Checks that a picture fits into the allowed memory and into its file type, and may still be written.
@@ -217,7 +217,7 @@ impl Prepared<'_> {
         let picture = picture::bytes(self.effective, self.shot.kind, behind(job))
             + picture::bytes_of_rays(self.work.settings, forecast.rays.value);
         let format = job.stats.as_ref().map(|stats| stats.format);
-        let which = dry_run::Which { file: self.task.file(), view: self.phrase, target: &self.shot.target };
+        let which = dry_run::PictureId { file: self.task.file(), view: self.phrase, target: &self.shot.target };
         let told = dry_run::told(which, &self.work, &forecast, picture, format);
         if job.stats_file().is_some() {
             run_state.foretold.push(told);

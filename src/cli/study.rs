@@ -91,7 +91,7 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
         rows: Vec::new(),
         complete: false,
     };
-    let told = Told { files, messages };
+    let told = RowSinks { files, messages };
     messages.print(&text::head(&study))?;
     for setting in settings(&subject) {
         if interrupt::raised() {
@@ -109,12 +109,12 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
 }
 
 /// Sinks of the rows.
-struct Told<'a> {
+struct RowSinks<'a> {
     files: &'a [(PathBuf, Format)],
     messages: &'a Messages,
 }
 
-impl Told<'_> {
+impl RowSinks<'_> {
     /// Writes every report with the rows so far, so that a crash costs only one row.
     fn write(&self, study: &Study) -> Result<(), Exit> {
         self.files.iter().try_for_each(|(path, format)| {

@@ -5,7 +5,7 @@ use super::{Output, Picture, ToneMap, srgb, tone};
 
 /// Statistics of a developed picture where it is covered: is it too dark, blown out, empty?
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Look {
+pub struct PictureStatistics {
     /// Fraction of pixels with any coverage.
     pub coverage: f64,
     /// Mean luma (Rec. 709 weights of the sRGB codes, 0..=1), weighted by coverage.
@@ -17,7 +17,7 @@ pub struct Look {
 }
 
 /// Computes the statistics of a picture through the tone map and exposure of `output`, without its background.
-pub fn look(picture: &Picture, output: &Output) -> Look {
+pub fn look(picture: &Picture, output: &Output) -> PictureStatistics {
     let output = Output { background: None, ..output.clone() };
     let developer = Developer::new(&output);
     let (mut covered, mut clipped, mut not_numbers) = (0_u64, 0_u64, 0);
@@ -34,7 +34,7 @@ pub fn look(picture: &Picture, output: &Output) -> Look {
         }
     }
     let ratio = |n: u64, of: u64| if of == 0 { 0.0 } else { n as f64 / of as f64 };
-    Look {
+    PictureStatistics {
         coverage: ratio(covered, picture.beauty.len() as u64),
         mean_luminance: if weight > 0.0 { luma / weight } else { 0.0 },
         clipped: ratio(clipped, covered),

@@ -125,7 +125,7 @@ impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
 
 impl<S: Lanewise<N>, const N: usize> Rows<S, N> for Fan<S, N> {
     type Ready = FanReady;
-    type Look = FanLook<S, N>;
+    type BlockTest = FanLook<S, N>;
 
     #[inline(always)]
     fn ready<T: Simd>(&self, s: T, corners: &Corners8) -> FanReady {

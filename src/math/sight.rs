@@ -31,7 +31,7 @@ pub(super) static AXES: [[Axis; 3]; 4] = {
 };
 
 /// Result of testing a ray against eight triangles.
-pub struct Look<S: Simd> {
+pub struct BlockTest<S: Simd> {
     /// Triangles that the ray hits.
     pub verdicts: Verdicts,
     view: View<S, LANES>,
@@ -40,7 +40,7 @@ pub struct Look<S: Simd> {
 impl Sight {
     /// Tests eight triangles.
     #[inline(always)]
-    pub fn look<S: Simd>(&self, s: S, corners: &Corners8) -> Look<S> {
+    pub fn look<S: Simd>(&self, s: S, corners: &Corners8) -> BlockTest<S> {
         let [ox, oy, oz] = [s.splat(self.origin[0]), s.splat(self.origin[1]), s.splat(self.origin[2])];
         let [p, q] = [s.splat(self.shear[0]), s.splat(self.shear[1])];
         let [x, y, z] = AXES[self.main as usize % 4];
@@ -50,11 +50,11 @@ impl Sight {
         let (bx, by) = (s.sub_mul(p, bz, s.sub(s.along(b, x), ox)), s.sub_mul(q, bz, s.sub(s.along(b, y), oy)));
         let (cx, cy) = (s.sub_mul(p, cz, s.sub(s.along(c, x), ox)), s.sub_mul(q, cz, s.sub(s.along(c, y), oy)));
         let (verdicts, view) = view(s, [[ax, ay], [bx, by], [cx, cy]], [az, bz, cz]);
-        Look { verdicts, view }
+        BlockTest { verdicts, view }
     }
 }
 
-impl<S: Simd> Look<S> {
+impl<S: Simd> BlockTest<S> {
     /// Bounds of the exact distances of the triangles that are hit for certain.
     ///
     /// The exact distance is the mean of the corners' heights, weighted by the exact edge values, all of one sign, over the
@@ -84,16 +84,16 @@ pub trait Rows<S: Lanewise<N>, const N: usize> {
     /// Eight prepared triangles.
     type Ready;
     /// Result of testing the rays against one triangle.
-    type Look;
+    type BlockTest;
 
     /// Prepares eight triangles.
     fn ready<T: Simd>(&self, s: T, corners: &Corners8) -> Self::Ready;
 
     /// Tests one of eight prepared triangles, with a bit per ray. A hit behind the origin may be reported as a miss.
-    fn look(&self, s: S, ready: &Self::Ready, lane: usize) -> (Verdicts, Self::Look);
+    fn look(&self, s: S, ready: &Self::Ready, lane: usize) -> (Verdicts, Self::BlockTest);
 
     /// Bounds of the exact distances of the rays that hit for certain.
-    fn distances(&self, s: S, ready: &Self::Ready, lane: usize, look: &Self::Look) -> [S::Lanes; 2];
+    fn distances(&self, s: S, ready: &Self::Ready, lane: usize, look: &Self::BlockTest) -> [S::Lanes; 2];
 }
 
 impl<S: Lanewise<N>, const N: usize> RowSight<S, N> {
@@ -125,7 +125,7 @@ impl<S: Lanewise<N>, const N: usize> RowSight<S, N> {
 
 impl<S: Lanewise<N>, const N: usize> Rows<S, N> for RowSight<S, N> {
     type Ready = Corners8;
-    type Look = View<S, N>;
+    type BlockTest = View<S, N>;
 
     /// Puts the coordinates into sheared order.
     #[inline(always)]
@@ -188,7 +188,7 @@ fn view<S: Lanewise<N>, const N: usize>(
 }
 
 impl<S: Lanewise<N>, const N: usize> View<S, N> {
-    /// [`Look::distances`] with given margins of weights and heights.
+    /// [`BlockTest::distances`] with given margins of weights and heights.
     #[inline(always)]
     fn distances(&self, s: S, per_length: S::Lanes, [weights, heights]: [f32; 2]) -> [S::Lanes; 2] {
         let ([u, v, w], [a, b, c]) = (self.edges, self.heights);

@@ -12,7 +12,7 @@ use crate::accel::query::Goal;
 use crate::accel::query_batch::QueryBatch;
 use crate::accel::{NO_PRIM, Shapes};
 use crate::math::shear::RaySpace;
-use crate::math::sight::{Look, Sight};
+use crate::math::sight::{BlockTest, Sight};
 use crate::math::simd::{LANES, Row, Simd};
 use crate::math::triangle::{self, Triangle};
 use crate::math::triangles::{Corners8, corners_of};
@@ -145,7 +145,7 @@ impl Seeker {
     }
 
     #[inline(always)]
-    fn met<S: Simd>(&self, s: S, sight: &Sight, look: &Look<S>, count: u32) -> BlockHits {
+    fn met<S: Simd>(&self, s: S, sight: &Sight, look: &BlockTest<S>, count: u32) -> BlockHits {
         let [low, high] = look.distances(s, sight);
         let in_time = s.at_most(low, s.splat(self.best.high)) & s.at_most(s.splat(self.t_min), high);
         let (hit, unsure) = (look.verdicts.hit & in_time & lanes(count), look.verdicts.unsure & lanes(count));

@@ -18,7 +18,7 @@ use super::message::{Messages, Severity};
 use super::writable::{self, Sources};
 use super::{interrupt, output_name, panics};
 use crate::image::diff::{
-    Difference, LayerDifference, Looks, Space, compare, greatest, layer_differences, looks, side_by_side,
+    Difference, FlipResult, LayerDifference, Space, compare, greatest, layer_differences, looks, side_by_side,
 };
 use crate::image::draw::heat::{Map, Scale};
 use crate::image::read::{PictureFile, read_picture_file};
@@ -39,7 +39,7 @@ struct Compared {
     actual: Picture,
     space: Space,
     difference: Difference,
-    looks: Looks,
+    looks: FlipResult,
     layers: Vec<LayerDifference>,
     layers_of_one: Vec<String>,
     /// Parts of the files that were neither read nor compared, each with its file.

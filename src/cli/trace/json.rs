@@ -1,6 +1,6 @@
 //! Ray tree of a sample as JSON; the schema is described in [`super`].
 
-use super::Told;
+use super::TraceReport;
 use super::words::{hit_surface, in_world, inside, light, object};
 use crate::accel::probe::{Extent, NodeId, Test, Visit};
 use crate::accel::{Hit, RayCounts};
@@ -10,7 +10,7 @@ use crate::render::ray_tree::{Class, Event, Query};
 use serde_json::{Map, Value, json};
 
 /// Writes one object.
-pub(super) fn write(told: &Told) -> String {
+pub(super) fn write(told: &TraceReport) -> String {
     let settings = told.settings;
     let value = json!({
         "schema": "meshray-trace/1",
@@ -33,7 +33,7 @@ pub(super) fn write(told: &Told) -> String {
     format!("{value:#}\n")
 }
 
-fn query(told: &Told, i: usize) -> Value {
+fn query(told: &TraceReport, i: usize) -> Value {
     let query = &told.ray_tree.queries[i];
     let scene = &told.loaded.scene;
     let mut object = Map::new();
@@ -76,7 +76,7 @@ fn counts(c: &RayCounts) -> Value {
     c.named().into_iter().map(|(name, n)| (name.to_owned(), Value::from(n))).collect()
 }
 
-fn hit(told: &Told, query: &Query) -> Value {
+fn hit(told: &TraceReport, query: &Query) -> Value {
     let Hit { t, prim, .. } = query.hit;
     let Some(hit_surface) = hit_surface(told.loaded, told.world, query) else { return Value::Null };
     if query.question == Question::Occluded {
@@ -94,7 +94,7 @@ fn hit(told: &Told, query: &Query) -> Value {
     })
 }
 
-fn step(told: &Told, query: &Query, event: &Event) -> Value {
+fn step(told: &TraceReport, query: &Query, event: &Event) -> Value {
     match event {
         Event::Visit(visit) => self::visit(told, query, visit),
         Event::Test(Test { prim, t, outcome }) => {
@@ -106,7 +106,7 @@ fn step(told: &Told, query: &Query, event: &Event) -> Value {
     }
 }
 
-fn visit(told: &Told, query: &Query, visit: &Visit) -> Value {
+fn visit(told: &TraceReport, query: &Query, visit: &Visit) -> Value {
     let (what, at) = match visit.place {
         NodeId::Cell(cell) => ("cell", json!(cell)),
         NodeId::OctreeNode(at, level) => ("octree node", json!([at[0], at[1], at[2], level])),

@@ -42,7 +42,7 @@ pub(super) use args::TraceArgs;
 use std::path::Path;
 
 /// Everything to report.
-struct Told<'a> {
+struct TraceReport<'a> {
     name: &'a str,
     loaded: &'a Loaded,
     world: &'a World,
@@ -122,7 +122,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
         let text = format!("the picture has no pixel {:?} or no sample {} of it", args.pixel, args.sample);
         messages.wrong(UsageError(text))
     })?;
-    let told = Told {
+    let told = TraceReport {
         name,
         loaded: &loaded,
         world: &world,
@@ -159,7 +159,7 @@ fn inside(args: &TraceArgs, settings: &Settings) -> Result<(), UsageError> {
     Ok(())
 }
 
-fn draw(path: &Path, told: &Told, job: &Job, messages: &Messages) -> Result<Exit, Diagnostic> {
+fn draw(path: &Path, told: &TraceReport, job: &Job, messages: &Messages) -> Result<Exit, Diagnostic> {
     let fault = |text: String| Diagnostic::new("output-unwritable", path, "", text);
     let canvas = picture::draw(told, job);
     let bytes = canvas.png(&Metadata::new()).map_err(|e| fault(e.to_string()))?;
@@ -169,7 +169,7 @@ fn draw(path: &Path, told: &Told, job: &Job, messages: &Messages) -> Result<Exit
     Ok(Exit::Done)
 }
 
-impl Told<'_> {
+impl TraceReport<'_> {
     /// Title that identifies the ray.
     fn title(&self) -> String {
         let Settings { width, height, samples, .. } = self.settings;

@@ -3,7 +3,7 @@
 //! An orthographic camera looks at the ray from the side. Its rays start on the plane through the ray, so that nothing occludes
 //! it. The left view shows the whole scene, the right one the surroundings of the ray's end.
 
-use super::Told;
+use super::TraceReport;
 use super::words::{in_world, inside};
 use crate::accel::probe::{Extent, Outcome, Visit};
 use crate::accel::{AccelChoice, AccelKind, AccelParams};
@@ -35,7 +35,7 @@ const REFLECTED: Color = [0, 158, 115];
 const REFRACTED: Color = [204, 121, 167];
 
 /// Draws both views and a legend.
-pub(super) fn draw(told: &Told, job: &Job) -> Canvas {
+pub(super) fn draw(told: &TraceReport, job: &Job) -> Canvas {
     let Some(eye) = told.ray_tree.queries.first() else { return Canvas::filled(1, 1, PAPER) };
     // Backdrop by the default structure, whatever the ray went through: all give the same picture, and this one is fast.
     let (accel, _) = told.world.structure(AccelChoice::Kind(AccelKind::DEFAULT), &AccelParams::DEFAULT);
@@ -114,7 +114,7 @@ fn parts(eye: &Query) -> Vec<(Visit, Part)> {
 
 /// The ray and the camera that shows it.
 struct Stage<'a> {
-    told: &'a Told<'a>,
+    told: &'a TraceReport<'a>,
     eye: &'a Query,
     parts: Vec<(Visit, Part)>,
     /// Ends of the ray as drawn, in world space.
@@ -132,7 +132,7 @@ struct Window {
 }
 
 impl<'a> Stage<'a> {
-    fn new(told: &'a Told<'a>, eye: &'a Query) -> Self {
+    fn new(told: &'a TraceReport<'a>, eye: &'a Query) -> Self {
         let origin = in_world(told.world, eye.ray.origin);
         let dir = eye.ray.dir.as_dvec3();
         let parts = parts(eye);

@@ -1,6 +1,6 @@
 //! Ray tree of a sample as text.
 
-use super::Told;
+use super::TraceReport;
 use super::words::{goes_on, hit_surface, in_world, inside, light, object};
 use crate::accel::probe::{Extent, NodeId, Outcome, Visit};
 use crate::math::{DVec3, Vec3};
@@ -10,7 +10,7 @@ use crate::render::ray_tree::{Class, Event, Query};
 use std::fmt::Write;
 
 /// Writes everything, ray by ray.
-pub(super) fn write(told: &Told) -> String {
+pub(super) fn write(told: &TraceReport) -> String {
     let mut out = format!("{}\n\n", told.title());
     tell(told, 0, 0, &mut out);
     let rays = told.ray_tree.queries.len();
@@ -21,7 +21,7 @@ pub(super) fn write(told: &Told) -> String {
 }
 
 /// Writes a query, its steps and its children, indented by its depth in the tree.
-fn tell(told: &Told, i: usize, depth: usize, out: &mut String) {
+fn tell(told: &TraceReport, i: usize, depth: usize, out: &mut String) {
     let query = &told.ray_tree.queries[i];
     let margin = "  ".repeat(depth);
     let _ = writeln!(out, "{margin}{}", headline(told, query));
@@ -35,7 +35,7 @@ fn tell(told: &Told, i: usize, depth: usize, out: &mut String) {
     query.children.iter().for_each(|&child| tell(told, child, depth + 1, out));
 }
 
-fn headline(told: &Told, query: &Query) -> String {
+fn headline(told: &TraceReport, query: &Query) -> String {
     let scene = &told.loaded.scene;
     let from = format!("from {} towards {}", place_in(told, query.ray.origin), vector(query.ray.dir));
     match (query.class, query.question) {
@@ -54,7 +54,7 @@ fn headline(told: &Told, query: &Query) -> String {
     }
 }
 
-fn ending(told: &Told, query: &Query) -> String {
+fn ending(told: &TraceReport, query: &Query) -> String {
     let Some(hit_surface) = hit_surface(told.loaded, told.world, query) else {
         return match query.question {
             Question::Occluded => "nothing in the way stops its light".into(),
@@ -88,7 +88,7 @@ fn counts(query: &Query) -> String {
 }
 
 /// One line per node or cell, followed by the tests done in it.
-fn steps(told: &Told, query: &Query) -> Vec<String> {
+fn steps(told: &TraceReport, query: &Query) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut runs = Runs::default();
     for event in &query.events {
@@ -103,7 +103,7 @@ fn steps(told: &Told, query: &Query) -> Vec<String> {
     lines
 }
 
-fn visit(told: &Told, query: &Query, visit: &Visit) -> String {
+fn visit(told: &TraceReport, query: &Query, visit: &Visit) -> String {
     let numbers = |n: [u32; 3]| format!("{} {} {}", n[0], n[1], n[2]);
     let what = match visit.place {
         NodeId::Cell(cell) => format!("cell {}", numbers(cell)),
@@ -134,12 +134,12 @@ fn visit(told: &Told, query: &Query, visit: &Visit) -> String {
 }
 
 /// Formats a position of the centred frame in world space.
-fn place_in(told: &Told, place: Vec3) -> String {
+fn place_in(told: &TraceReport, place: Vec3) -> String {
     point(in_world(told.world, place), resolution(told))
 }
 
 /// Distance that is significant for positions: a millionth of the scene's extent.
-fn resolution(told: &Told) -> f64 {
+fn resolution(told: &TraceReport) -> f64 {
     let (lo, hi) = told.world.bounds;
     1e-6 * (hi - lo).max_element()
 }

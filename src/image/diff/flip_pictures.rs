@@ -12,7 +12,7 @@ pub const PIXELS_PER_DEGREES: RangeInclusive<f64> = 0.01..=1000.0;
 
 /// Result of FLIP: how different two pictures look.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Looks {
+pub struct FlipResult {
     /// FLIP of each pixel, 0..=1.
     pub values: Vec<f32>,
     /// Mean of the values.
@@ -31,7 +31,7 @@ pub struct Looks {
 /// Displayed pictures with transparent parts are compared on black and on white, and the worse of both counts for each
 /// pixel. Linear pictures are compared on black, at every exposure that suits them. NaNs are black to their
 /// neighbours; a pixel with a NaN in just one picture differs by 1, in both pictures by 0.
-pub fn looks(expected: &Picture, actual: &Picture, space: Space, pixels_per_degree: f64) -> Option<Looks> {
+pub fn looks(expected: &Picture, actual: &Picture, space: Space, pixels_per_degree: f64) -> Option<FlipResult> {
     let can_be_seen = PIXELS_PER_DEGREES.contains(&pixels_per_degree);
     if !(can_be_seen && super::are_alike(expected, actual)) {
         return None;
@@ -72,7 +72,7 @@ pub fn looks(expected: &Picture, actual: &Picture, space: Space, pixels_per_degr
         }
     }
     let mean = sum / values.len().max(1) as f64;
-    Some(Looks { mean, max, worst: place(worst, expected.width), values, exposures })
+    Some(FlipResult { mean, max, worst: place(worst, expected.width), values, exposures })
 }
 
 /// Linear pixels over black, NaN as black.

@@ -8,7 +8,7 @@ pub mod flip;
 mod flip_pictures;
 mod layers;
 
-pub use flip_pictures::{Looks, PIXELS_PER_DEGREES, looks};
+pub use flip_pictures::{FlipResult, PIXELS_PER_DEGREES, looks};
 pub use layers::{LayerDifference, layer_differences};
 
 use super::{Picture, srgb};

@@ -10,7 +10,7 @@ mod model;
 mod opened;
 mod tests;
 
-pub use model::{Offered, is_called_an_archive};
+pub use model::{ArchiveModel, is_called_an_archive};
 pub(super) use model::{named_model, only_model, source, unreadable};
 pub(crate) use opened::{in_archive, opened, split};
 

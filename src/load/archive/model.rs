@@ -13,14 +13,14 @@ use std::sync::Arc;
 
 /// A model in an archive.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Offered<'a> {
+pub struct ArchiveModel<'a> {
     /// Path of its file, with `/` between folders.
     pub name: &'a str,
     /// Files beside it that differ only in the extension: the same model in other formats.
     pub others: Vec<&'a str>,
 }
 
-impl Offered<'_> {
+impl ArchiveModel<'_> {
     /// Diagnostic about the archive that the other formats are not drawn; `None` if there are none.
     pub fn note(&self, archive: &Path) -> Option<Diagnostic> {
         let first = self.others.first()?;
@@ -39,7 +39,7 @@ pub fn is_called_an_archive(path: &Path) -> bool {
 impl Archive {
     /// Returns the models below a folder, in order, each in one format; hidden files are skipped, and the companion files that
     /// macOS adds.
-    pub fn models(&self, folder: &Path) -> Vec<Offered<'_>> {
+    pub fn models(&self, folder: &Path) -> Vec<ArchiveModel<'_>> {
         let files = self.below(folder).filter(|name| is_shown(name) && is_called_a_model(Path::new(name)));
         let mut by_stem: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
         files.for_each(|name| {
@@ -50,7 +50,7 @@ impl Archive {
                 let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
                 MODELS.iter().position(|kind| extension.eq_ignore_ascii_case(kind))
             });
-            Offered { name: files.remove(0), others: files }
+            ArchiveModel { name: files.remove(0), others: files }
         });
         offered.collect()
     }
@@ -97,7 +97,7 @@ pub(in crate::load) fn only_model(archive: Arc<Archive>, limits: &Limits) -> Res
 /// Reads the only model that lies in the archive itself.
 fn model_of(archive: Arc<Archive>, limits: &Limits) -> Result<Source, LoadError> {
     let models = archive.models(Path::new(""));
-    let [Offered { name, .. }] = &models[..] else { return Err(none_or_several(&archive, &models).into()) };
+    let [ArchiveModel { name, .. }] = &models[..] else { return Err(none_or_several(&archive, &models).into()) };
     let (name, note) = (PathBuf::from(name), models[0].note(&archive.path));
     Ok(Source { note, ..source(archive, &name, limits)? })
 }
@@ -116,8 +116,8 @@ pub(in crate::load) fn named_model(archive: Arc<Archive>, name: &Path, limits: &
     let (archive, name) = (archive.path.display(), shown(name));
     let remedy = match (nearest(&name, models.iter().map(|model| model.name)), &models[..]) {
         (Some(meant), _) => format!("did you mean '{archive}/{meant}'?"),
-        (None, [Offered { name, .. }]) => format!("its model is '{archive}/{name}'"),
-        (None, [Offered { name, .. }, ..]) => {
+        (None, [ArchiveModel { name, .. }]) => format!("its model is '{archive}/{name}'"),
+        (None, [ArchiveModel { name, .. }, ..]) => {
             format!("it has {} models, the first is '{archive}/{name}'", models.len())
         }
         (None, []) => "it has no model".into(),
@@ -146,7 +146,7 @@ pub(in crate::load) fn unreadable(error: io::Error, path: &Path) -> LoadError {
 }
 
 /// Diagnostic for an archive with several models, or with none.
-fn none_or_several(archive: &Archive, models: &[Offered]) -> Diagnostic {
+fn none_or_several(archive: &Archive, models: &[ArchiveModel]) -> Diagnostic {
     /// Most names that are listed.
     const TOLD: usize = 4;
     let list = |names: &mut dyn Iterator<Item = &str>| {

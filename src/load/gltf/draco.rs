@@ -6,7 +6,7 @@
 
 use super::accessor::Format;
 use super::buffers::Buffers;
-use super::draco_codec::{self, Output, Wanted};
+use super::draco_codec::{self, Output, WantedAttribute};
 use super::draco_stream;
 use super::report::Report;
 use super::schema::whole;
@@ -120,7 +120,7 @@ struct Plan<'a> {
     indices: (usize, u64),
     /// Accessors of the attributes, the requests to the decoder, and the declared counts.
     accessors: Vec<usize>,
-    wanted: Vec<Wanted>,
+    wanted: Vec<WantedAttribute>,
     declared: Vec<u64>,
 }
 
@@ -142,7 +142,7 @@ impl<'a> Task<'a> {
         let declared: Vec<u64> = wanted.iter().map(|w| w.most).collect();
         let most = counts.most_values(declared.iter().copied().max().unwrap_or(0));
         wanted.iter_mut().for_each(|w| w.most = most);
-        let kept = wanted.iter().map(Wanted::size).fold(counts.faces.saturating_mul(12), u64::saturating_add);
+        let kept = wanted.iter().map(WantedAttribute::size).fold(counts.faces.saturating_mul(12), u64::saturating_add);
         self.charge(counts.cost(most, (wanted.len() + draco_codec::SPARE) as u64).saturating_add(kept), budget)?;
         let task = Task { place: self.place.clone(), ..*self };
         Ok(Some(Plan { task, bytes, indices, accessors, wanted, declared }))
@@ -200,7 +200,7 @@ impl<'a> Task<'a> {
     }
 
     /// Accessors of the compressed attributes, and the request for each.
-    fn attributes(&self) -> (Vec<usize>, Vec<Wanted>) {
+    fn attributes(&self) -> (Vec<usize>, Vec<WantedAttribute>) {
         let listed = self.properties.get("attributes").and_then(Value::as_object);
         let attribute = |(semantic, index): (&Checked<Semantic>, &Index<Accessor>)| {
             let Checked::Valid(semantic) = semantic else { return None };
@@ -209,7 +209,7 @@ impl<'a> Task<'a> {
             let accessor = self.root.accessors.get(index.value())?;
             let format = Format::of(accessor)?;
             let (component, width) = (format.component, format.width());
-            Some((index.value(), Wanted { id, name, component, width, most: accessor.count.0 }))
+            Some((index.value(), WantedAttribute { id, name, component, width, most: accessor.count.0 }))
         };
         self.primitive.attributes.iter().filter_map(attribute).unzip()
     }

@@ -8,7 +8,7 @@ pub(super) const SPARE: usize = 2;
 /// A requested attribute, in the type that its accessor declares.
 #[derive(Clone, Debug)]
 #[cfg_attr(not(feature = "draco"), expect(dead_code, reason = "only the decoder looks for attributes"))]
-pub(super) struct Wanted {
+pub(super) struct WantedAttribute {
     /// Id of the attribute in the stream.
     pub(super) id: u64,
     /// Name of the attribute, for messages.
@@ -20,7 +20,7 @@ pub(super) struct Wanted {
     pub(super) most: u64,
 }
 
-impl Wanted {
+impl WantedAttribute {
     /// Upper bound of the bytes of all values.
     pub(super) fn size(&self) -> u64 {
         self.most.saturating_mul((self.width * self.component.size()) as u64)
@@ -42,13 +42,13 @@ pub(super) struct Output {
 /// # Errors
 /// What is wrong with the stream, or which attribute it lacks.
 #[cfg(feature = "draco")]
-pub(super) fn decode(stream: &[u8], wanted: &[Wanted]) -> Result<Output, String> {
+pub(super) fn decode(stream: &[u8], wanted: &[WantedAttribute]) -> Result<Output, String> {
     decoder::decode(stream, wanted)
 }
 
 /// Stub without the library, which returns an error.
 #[cfg(not(feature = "draco"))]
-pub(super) fn decode(_: &[u8], _: &[Wanted]) -> Result<Output, String> {
+pub(super) fn decode(_: &[u8], _: &[WantedAttribute]) -> Result<Output, String> {
     Err("this meshray was built without the feature 'draco'".into())
 }
 
@@ -56,7 +56,7 @@ pub(super) fn decode(_: &[u8], _: &[Wanted]) -> Result<Output, String> {
 mod decoder {
     //! Conversion of decoded values to the types that accessors declare.
 
-    use super::{ComponentType, Output, Wanted};
+    use super::{ComponentType, Output, WantedAttribute};
     use crate::catch_panic::attempt;
     use crate::load::gltf::draco_points::Points;
     use crate::load::gltf::draco_survey::check;
@@ -65,11 +65,11 @@ mod decoder {
     use draco_oxide_decoder::Err as Failure;
     use draco_oxide_decoder::connectivity::Connectivity;
 
-    pub(super) fn decode(stream: &[u8], wanted: &[Wanted]) -> Result<Output, String> {
+    pub(super) fn decode(stream: &[u8], wanted: &[WantedAttribute]) -> Result<Output, String> {
         let decoded = attempt(|| mesh(stream, wanted));
         let damaged = || String::from("the stream cannot be decoded: it is damaged");
         let (mesh, corners, points) = decoded.unwrap_or_else(|| Err(damaged()))?;
-        let attribute = |wanted: &Wanted| {
+        let attribute = |wanted: &WantedAttribute| {
             let mut all = mesh.attributes.iter();
             let found = all.find(|attribute| attribute.get_id().as_usize() as u64 == wanted.id);
             let attribute = found.ok_or_else(|| format!("the stream has no attribute {}", wanted.id))?;
@@ -97,7 +97,7 @@ mod decoder {
     }
 
     /// Returns the decoded mesh, the point of each corner, and the format's order of points where it differs from the library's.
-    fn mesh(stream: &[u8], wanted: &[Wanted]) -> Result<(Mesh, Vec<u32>, Option<Points>), String> {
+    fn mesh(stream: &[u8], wanted: &[WantedAttribute]) -> Result<(Mesh, Vec<u32>, Option<Points>), String> {
         let survey = check(stream, wanted)?;
         let mesh = draco_oxide_decoder::decode_mesh(stream);
         let mesh = mesh.map_err(|why| match why {
@@ -144,7 +144,7 @@ mod decoder {
 
     impl Values<'_> {
         /// Converts the values at `places`, one per vertex, to the requested type; also returns their count.
-        fn convert(&self, places: &[u32], w: &Wanted) -> Result<(Vec<u8>, usize), String> {
+        fn convert(&self, places: &[u32], w: &WantedAttribute) -> Result<(Vec<u8>, usize), String> {
             let count = places.len();
             if self.width != w.width {
                 return Err(format!("{} components in the stream, {} in the accessor", self.width, w.width));

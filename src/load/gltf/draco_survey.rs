@@ -3,7 +3,7 @@
 //! The decoder trusts the numbers of attributes, symbols and orientations that a stream declares, and a damaged stream may
 //! declare any. After the Draco bitstream specification, version 2.2.
 
-use super::draco_codec::{SPARE, Wanted};
+use super::draco_codec::{SPARE, WantedAttribute};
 use super::draco_points::NONE;
 use super::draco_stream::{Cursor, Method, start};
 use draco_oxide_core::bit_coder::Reader;
@@ -29,7 +29,7 @@ pub(super) struct Survey {
 ///
 /// # Errors
 /// What is wrong with the stream.
-pub(super) fn check(stream: &[u8], wanted: &[Wanted]) -> Result<Survey, String> {
+pub(super) fn check(stream: &[u8], wanted: &[WantedAttribute]) -> Result<Survey, String> {
     let (counts, method, cursor) = start(stream)?;
     let most = wanted.iter().map(|w| w.most).max().unwrap_or(0);
     let mut walk = Walk { cursor, most };

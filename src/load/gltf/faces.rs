@@ -139,7 +139,7 @@ fn compact(mesh: &mut Mesh) {
 
 /// Faults found in directions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Odd {
+pub(super) struct OddDirections {
     /// Some vectors were not of unit length.
     pub(super) length: bool,
     /// Some vectors had no direction.
@@ -152,8 +152,8 @@ pub(super) struct Odd {
 const UNIT: f32 = 0.02;
 
 /// Normalises normals; those without a direction become the area-weighted mean of the adjacent face normals.
-pub(super) fn repair_normals(mesh: &mut Mesh) -> Odd {
-    let mut odd = Odd::default();
+pub(super) fn repair_normals(mesh: &mut Mesh) -> OddDirections {
+    let mut odd = OddDirections::default();
     for normal in &mut mesh.normals {
         let length = normal.length();
         odd.length |= (length - 1.0).abs() > UNIT;
@@ -176,8 +176,8 @@ pub(super) fn repair_normals(mesh: &mut Mesh) -> Odd {
 }
 
 /// Normalises tangents and sets their signs to 1 or −1; `none` means that they should be regenerated.
-pub(super) fn repair_tangents(tangents: &mut [Vec4]) -> Odd {
-    let mut odd = Odd::default();
+pub(super) fn repair_tangents(tangents: &mut [Vec4]) -> OddDirections {
+    let mut odd = OddDirections::default();
     for tangent in tangents {
         let direction = tangent.truncate();
         odd.length |= (direction.length() - 1.0).abs() > UNIT;

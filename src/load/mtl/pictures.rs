@@ -12,7 +12,7 @@ use std::collections::HashMap;
 
 /// A bitmap to derive from decoded pictures; picture numbers are indices into [`Pictures::sources`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Take {
+pub(super) enum TexelSource {
     /// The picture unchanged.
     Whole(usize),
     /// The picture's colour; alpha 1.
@@ -45,13 +45,13 @@ pub(super) enum Alpha {
 #[derive(Debug, Default)]
 pub(super) struct Pictures {
     sources: Vec<Bitmap>,
-    known: HashMap<Take, u32>,
-    made: Vec<Made>,
+    known: HashMap<TexelSource, u32>,
+    made: Vec<BitmapSource>,
 }
 
 /// A bitmap of the scene: a decoded picture, which is not copied, or a new one.
 #[derive(Debug)]
-enum Made {
+enum BitmapSource {
     Source(usize),
     New(Bitmap),
 }
@@ -67,7 +67,7 @@ impl Pictures {
     ///
     /// # Errors
     /// If the bitmap exceeds `limits` or the rest of `budget`.
-    pub(super) fn take(&mut self, take: Take, limits: &Limits, budget: &mut Budget) -> Result<u32, Unusable> {
+    pub(super) fn take(&mut self, take: TexelSource, limits: &Limits, budget: &mut Budget) -> Result<u32, Unusable> {
         if let Some(&known) = self.known.get(&take) {
             return Ok(known);
         }
@@ -75,13 +75,15 @@ impl Pictures {
             take_memory(width, height, texel, 0, limits, budget)?;
         }
         let made = match take {
-            Take::Whole(i) => Made::Source(i),
-            Take::Opaque(i) => Made::New(self.map(i, |[r, g, b, _]| [r, g, b, 1.0])),
-            Take::Channel(i, channel) => Made::New(self.map(i, |p| grey(pick(p, channel)))),
-            Take::Inverse(i, channel) => Made::New(self.map(i, |p| grey(1.0 - pick(p, channel)))),
-            Take::RoughMetal(rough, metal) => Made::New(self.rough_metal(rough, metal)),
-            Take::Coded(i, channel) => Made::New(self.coded(i, channel)),
-            Take::Anisotropy(strength, turn, most) => Made::New(self.anisotropy(strength, turn, f64::from_bits(most))),
+            TexelSource::Whole(i) => BitmapSource::Source(i),
+            TexelSource::Opaque(i) => BitmapSource::New(self.map(i, |[r, g, b, _]| [r, g, b, 1.0])),
+            TexelSource::Channel(i, channel) => BitmapSource::New(self.map(i, |p| grey(pick(p, channel)))),
+            TexelSource::Inverse(i, channel) => BitmapSource::New(self.map(i, |p| grey(1.0 - pick(p, channel)))),
+            TexelSource::RoughMetal(rough, metal) => BitmapSource::New(self.rough_metal(rough, metal)),
+            TexelSource::Coded(i, channel) => BitmapSource::New(self.coded(i, channel)),
+            TexelSource::Anisotropy(strength, turn, most) => {
+                BitmapSource::New(self.anisotropy(strength, turn, f64::from_bits(most)))
+            }
         };
         #[expect(clippy::cast_possible_truncation, reason = "a handful of pictures for each material")]
         let index = self.made.len() as u32;
@@ -91,35 +93,39 @@ impl Pictures {
     }
 
     /// Width and height of the bitmap to derive, and bytes per texel; `None` if nothing has to be allocated.
-    fn size(&self, take: Take) -> Option<((u32, u32), u64)> {
+    fn size(&self, take: TexelSource) -> Option<((u32, u32), u64)> {
         let size = |i: usize| (self.sources[i].width, self.sources[i].height);
         match take {
-            Take::Whole(_) => None,
-            Take::Opaque(i) | Take::Channel(i, _) | Take::Inverse(i, _) => {
+            TexelSource::Whole(_) => None,
+            TexelSource::Opaque(i) | TexelSource::Channel(i, _) | TexelSource::Inverse(i, _) => {
                 let is_deep = matches!(self.sources[i].pixels, Pixels::Rgba16(_));
                 Some((size(i), if is_deep { 8 } else { 4 }))
             }
-            Take::RoughMetal(rough, metal) => Some((self.size_of_pair([rough, metal]), 4)),
-            Take::Coded(i, _) => Some((size(i), 8)),
-            Take::Anisotropy(strength, turn, _) => Some((self.size_of_pair([strength, turn]), 8)),
+            TexelSource::RoughMetal(rough, metal) => Some((self.size_of_pair([rough, metal]), 4)),
+            TexelSource::Coded(i, _) => Some((size(i), 8)),
+            TexelSource::Anisotropy(strength, turn, _) => Some((self.size_of_pair([strength, turn]), 8)),
         }
     }
 
     /// Names of the source pictures, for messages.
-    pub(super) fn name(&self, take: Take) -> String {
+    pub(super) fn name(&self, take: TexelSource) -> String {
         match take {
-            Take::Whole(i) | Take::Opaque(i) | Take::Channel(i, _) | Take::Inverse(i, _) | Take::Coded(i, _) => {
-                self.sources[i].name.clone()
+            TexelSource::Whole(i)
+            | TexelSource::Opaque(i)
+            | TexelSource::Channel(i, _)
+            | TexelSource::Inverse(i, _)
+            | TexelSource::Coded(i, _) => self.sources[i].name.clone(),
+            TexelSource::RoughMetal(first, second) | TexelSource::Anisotropy(first, second, _) => {
+                self.name_of_pair([first, second])
             }
-            Take::RoughMetal(first, second) | Take::Anisotropy(first, second, _) => self.name_of_pair([first, second]),
         }
     }
 
     /// Returns the bitmaps in the order of their indices.
     pub(super) fn finish(mut self) -> Vec<Bitmap> {
         let bitmap = |made| match made {
-            Made::Source(i) => std::mem::take(&mut self.sources[i]),
-            Made::New(bitmap) => bitmap,
+            BitmapSource::Source(i) => std::mem::take(&mut self.sources[i]),
+            BitmapSource::New(bitmap) => bitmap,
         };
         self.made.into_iter().map(bitmap).collect()
     }
@@ -308,7 +314,7 @@ mod tests {
     }
 
     /// Derives a bitmap under the default limits.
-    fn make(pictures: &mut Pictures, take: Take) -> u32 {
+    fn make(pictures: &mut Pictures, take: TexelSource) -> u32 {
         let limits = Limits::default();
         pictures.take(take, &limits, &mut Budget::new(&limits)).ok().unwrap()
     }
@@ -317,11 +323,11 @@ mod tests {
     fn channels_move_to_where_materials_read_them() {
         let mut p = pictures(&[(1, 1, &[[10, 20, 30, 40]])]);
         let takes = [
-            (Take::Whole(0), [10, 20, 30, 40]),
-            (Take::Opaque(0), [10, 20, 30, 255]),
-            (Take::Channel(0, Channel::Alpha), [40, 40, 40, 255]),
-            (Take::Inverse(0, Channel::Green), [235, 235, 235, 255]),
-            (Take::RoughMetal(Some((0, Channel::Red)), None), [255, 10, 255, 255]),
+            (TexelSource::Whole(0), [10, 20, 30, 40]),
+            (TexelSource::Opaque(0), [10, 20, 30, 255]),
+            (TexelSource::Channel(0, Channel::Alpha), [40, 40, 40, 255]),
+            (TexelSource::Inverse(0, Channel::Green), [235, 235, 235, 255]),
+            (TexelSource::RoughMetal(Some((0, Channel::Red)), None), [255, 10, 255, 255]),
         ];
         for (i, (take, _)) in (0..).zip(takes) {
             assert_eq!((make(&mut p, take), make(&mut p, take)), (i, i), "made once");
@@ -332,7 +338,7 @@ mod tests {
     #[test]
     fn roughness_and_metal_of_different_sizes_share_a_bitmap() {
         let mut p = pictures(&[(2, 1, &[[1; 4], [2; 4]]), (1, 2, &[[3; 4], [4; 4]])]);
-        make(&mut p, Take::RoughMetal(Some((0, Channel::Red)), Some((1, Channel::Red))));
+        make(&mut p, TexelSource::RoughMetal(Some((0, Channel::Red)), Some((1, Channel::Red))));
         assert_eq!(texels(p), [[[255, 1, 3, 255], [255, 2, 3, 255], [255, 1, 4, 255], [255, 2, 4, 255]]]);
     }
 
@@ -341,9 +347,9 @@ mod tests {
         let mut p = pictures(&[(2, 1, &[[51, 0, 0, 0], [128, 0, 0, 0]])]);
         let (red, quarter) = (Some((0, Channel::Red)), 0.25f64.to_bits());
         let takes = [
-            Take::Coded(0, Channel::Red),
-            Take::Anisotropy(red, None, quarter),
-            Take::Anisotropy(None, red, 5f64.to_bits()),
+            TexelSource::Coded(0, Channel::Red),
+            TexelSource::Anisotropy(red, None, quarter),
+            TexelSource::Anisotropy(None, red, 5f64.to_bits()),
         ];
         for take in takes {
             make(&mut p, take);
@@ -368,21 +374,21 @@ mod tests {
         let pair = 3000 * 3000 * 4 + 3_000_000 * 8;
         let mut budget = Budget::new(&Limits { memory: pair, ..Limits::default() });
         let small = Limits { image_pixels: 3000 * 3000 - 1, ..Limits::default() };
-        let over = p.take(Take::RoughMetal(row, column), &small, &mut budget).unwrap_err();
+        let over = p.take(TexelSource::RoughMetal(row, column), &small, &mut budget).unwrap_err();
         assert!(over.why.contains("3000×3000 pixels"), "{}", over.why);
-        assert!(p.take(Take::RoughMetal(row, column), &Limits::default(), &mut budget).is_ok());
-        assert_eq!((budget.left(), p.name(Take::Anisotropy(row, column, 0)).as_str()), (0, "p + p"));
+        assert!(p.take(TexelSource::RoughMetal(row, column), &Limits::default(), &mut budget).is_ok());
+        assert_eq!((budget.left(), p.name(TexelSource::Anisotropy(row, column, 0)).as_str()), (0, "p + p"));
         for take in [
-            Take::Opaque(0),
-            Take::Coded(0, Channel::Red),
-            Take::Anisotropy(row, None, 0),
-            Take::Inverse(0, Channel::Red),
+            TexelSource::Opaque(0),
+            TexelSource::Coded(0, Channel::Red),
+            TexelSource::Anisotropy(row, None, 0),
+            TexelSource::Inverse(0, Channel::Red),
         ] {
             assert!(p.take(take, &Limits::default(), &mut budget).is_err(), "{take:?}");
         }
         // Bitmaps that exist already cost nothing.
-        assert!(p.take(Take::Whole(0), &Limits::default(), &mut budget).is_ok());
-        assert!(p.take(Take::RoughMetal(row, column), &Limits::default(), &mut budget).is_ok());
+        assert!(p.take(TexelSource::Whole(0), &Limits::default(), &mut budget).is_ok());
+        assert!(p.take(TexelSource::RoughMetal(row, column), &Limits::default(), &mut budget).is_ok());
     }
 
     #[test]

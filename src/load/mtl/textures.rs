@@ -2,7 +2,7 @@
 
 use super::options::{Channel, Map};
 use super::parse::{Mtl, Slot};
-use super::pictures::{Alpha, Pictures, Take};
+use super::pictures::{Alpha, Pictures, TexelSource};
 use crate::load::finder::{Finder, FoundPath, unquote};
 use crate::load::limits::{Budget, Limits, OverBudget};
 use crate::load::paths::{FileFault, taken_from};
@@ -164,7 +164,13 @@ impl Textures {
     }
 
     /// Makes a texture of `take`, transformed and wrapped by the options of `map`.
-    fn texture(&mut self, take: Take, map: &Map, limits: &Limits, budget: &mut Budget) -> Result<TextureRef, Unusable> {
+    fn texture(
+        &mut self,
+        take: TexelSource,
+        map: &Map,
+        limits: &Limits,
+        budget: &mut Budget,
+    ) -> Result<TextureRef, Unusable> {
         let bitmap = self.pictures.take(take, limits, budget)?;
         let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
         let wanted = Texture { bitmap, sampler: Sampler { wrap_u: wrap, wrap_v: wrap, ..Sampler::default() } };
@@ -235,7 +241,7 @@ impl Mapper<'_> {
     }
 
     /// Makes a texture of `take` by the options of `map`; `None`, with a warning, if it takes too much memory.
-    fn texture(&mut self, take: Take, map: &Map) -> Option<TextureRef> {
+    fn texture(&mut self, take: TexelSource, map: &Map) -> Option<TextureRef> {
         let made = self.textures.texture(take, map, self.limits, self.budget);
         let warn = |why: Unusable| {
             let name = self.textures.pictures.name(take);
@@ -248,7 +254,7 @@ impl Mapper<'_> {
         let (map, picture) = self.picture(slot)?;
         let map = map.clone();
         self.options(&map);
-        self.texture(Take::Whole(picture), &map)
+        self.texture(TexelSource::Whole(picture), &map)
     }
 
     /// Texture of a scalar map: the requested channel, or the luminance.
@@ -260,13 +266,13 @@ impl Mapper<'_> {
         self.texture(take, &map)
     }
 
-    fn brightness(&self, picture: usize, channel: Option<Channel>) -> Take {
+    fn brightness(&self, picture: usize, channel: Option<Channel>) -> TexelSource {
         match channel {
             None | Some(Channel::Luminance | Channel::Red) if self.textures.pictures.is_grey(picture) => {
-                Take::Whole(picture)
+                TexelSource::Whole(picture)
             }
-            None => Take::Channel(picture, Channel::Luminance),
-            Some(channel) => Take::Channel(picture, channel),
+            None => TexelSource::Channel(picture, Channel::Luminance),
+            Some(channel) => TexelSource::Channel(picture, channel),
         }
     }
 
@@ -292,13 +298,13 @@ impl Mapper<'_> {
         if let Some((map, picture)) = diffuse {
             self.options(&map);
             let solid = alpha == Alpha::Solid || by_diffuse || guessed || material.alpha_mode == AlphaMode::Opaque;
-            let take = if solid { Take::Whole(picture) } else { Take::Opaque(picture) };
+            let take = if solid { TexelSource::Whole(picture) } else { TexelSource::Opaque(picture) };
             material.base_color_map = self.texture(take, &map);
         }
     }
 
     /// Opacity from `map_d` or `map_Tr`; the flag says that it is the diffuse map's alpha channel instead.
-    fn dissolve(&mut self, diffuse: Option<usize>) -> (Option<(Take, Map)>, bool) {
+    fn dissolve(&mut self, diffuse: Option<usize>) -> (Option<(TexelSource, Map)>, bool) {
         if let Some((map, picture)) = self.picture(Slot::Dissolve) {
             let map = map.clone();
             self.options(&map);
@@ -320,7 +326,7 @@ impl Mapper<'_> {
         }
         let Some((map, picture)) = self.picture(Slot::Transparency) else { return (None, false) };
         let map = map.clone();
-        (Some((Take::Inverse(picture, map.channel.unwrap_or(Channel::Luminance)), map)), false)
+        (Some((TexelSource::Inverse(picture, map.channel.unwrap_or(Channel::Luminance)), map)), false)
     }
 
     /// Assigns the normal map and the bump map. Many programs write normal maps as bump maps; their texels give them away.
@@ -330,7 +336,7 @@ impl Mapper<'_> {
         if let Some((map, picture)) = self.picture(Slot::Normal) {
             let map = map.clone();
             material.normal_scale = strength(&map);
-            material.normal_map = self.texture(Take::Whole(picture), &map);
+            material.normal_map = self.texture(TexelSource::Whole(picture), &map);
         }
         // Displacement is drawn as bumps: faces keep their positions, on which the proofs about hits rest.
         let displaced = self.picture(Slot::Bump).is_none();
@@ -348,7 +354,7 @@ impl Mapper<'_> {
         if guessing && !displaced && material.normal_map.is_none() && self.textures.pictures.is_normal_map(picture) {
             self.guess("mtl-normal-as-bump", "a bump map is a normal map by its texels and used as one");
             material.normal_scale = strength(&map);
-            material.normal_map = self.texture(Take::Whole(picture), &map);
+            material.normal_map = self.texture(TexelSource::Whole(picture), &map);
             return;
         }
         if guessing {
@@ -366,7 +372,7 @@ impl Mapper<'_> {
         if let Some(sheen) = &mut m.sheen {
             let named = self.picture(Slot::Sheen).map(|(map, picture)| (map.clone(), picture));
             sheen.color_map = named.and_then(|(map, picture)| {
-                let take = Take::Coded(picture, map.channel.unwrap_or(Channel::Luminance));
+                let take = TexelSource::Coded(picture, map.channel.unwrap_or(Channel::Luminance));
                 self.texture(take, &map)
             });
         }
@@ -386,7 +392,7 @@ impl Mapper<'_> {
         let (strength, turn) = (self.picture(Slot::Anisotropy), self.picture(Slot::AnisotropyRotation));
         let map = strength.or(turn)?.0.clone();
         let most = self.mtl.anisor.filter(|turns| *turns != 0.0 || self.mode == MtlMode::Literal).unwrap_or(1.0);
-        let take = Take::Anisotropy(strength.map(channel), turn.map(channel), most.to_bits());
+        let take = TexelSource::Anisotropy(strength.map(channel), turn.map(channel), most.to_bits());
         self.texture(take, &map)
     }
 
@@ -397,7 +403,7 @@ impl Mapper<'_> {
         }
         let (map, picture) = self.picture(Slot::RoughMetalOcclusion)?;
         let map = map.clone();
-        self.texture(Take::Channel(picture, Channel::Blue), &map)
+        self.texture(TexelSource::Channel(picture, Channel::Blue), &map)
     }
 
     /// Warns of an ambient map that differs from the diffuse one.
@@ -414,13 +420,13 @@ impl Mapper<'_> {
     fn rough_metal(&mut self) -> Option<TextureRef> {
         if let Some((map, picture)) = self.picture(Slot::RoughMetalOcclusion) {
             let map = map.clone();
-            let take = Take::RoughMetal(Some((picture, Channel::Red)), Some((picture, Channel::Green)));
+            let take = TexelSource::RoughMetal(Some((picture, Channel::Red)), Some((picture, Channel::Green)));
             return self.texture(take, &map);
         }
         let channel = |(map, picture): (&Map, usize)| (picture, map.channel.unwrap_or(Channel::Luminance));
         let (rough, metal) = (self.picture(Slot::Roughness), self.picture(Slot::Metallic));
         let map = rough.or(metal)?.0.clone();
-        let take = Take::RoughMetal(rough.map(channel), metal.map(channel));
+        let take = TexelSource::RoughMetal(rough.map(channel), metal.map(channel));
         self.texture(take, &map)
     }
 

@@ -12,7 +12,7 @@ use std::path::Path;
 /// Finds the first fault, with the number of all of its kind. Where there is none, counts the corners that name texture
 /// coordinates or normals of which the file has none at all: such faces can still be drawn.
 pub(super) fn find(text: &[u8], file: &Path) -> Result<Tally, Diagnostic> {
-    let mut look = Look { file, line: 0, counts: [0; 3], faults: Vec::new(), forward: Vec::new() };
+    let mut look = FaultSearch { file, line: 0, counts: [0; 3], faults: Vec::new(), forward: Vec::new() };
     let mut lines = Lines::new(text);
     while let Some((line, text)) = lines.next() {
         look.line = line;
@@ -27,7 +27,7 @@ pub(super) fn find(text: &[u8], file: &Path) -> Result<Tally, Diagnostic> {
     look.finish()
 }
 
-struct Look<'a> {
+struct FaultSearch<'a> {
     file: &'a Path,
     line: u32,
     /// Numbers of `v`, `vt` and `vn` so far.
@@ -38,7 +38,7 @@ struct Look<'a> {
     forward: Vec<(u32, u32, usize, u32)>,
 }
 
-impl Look<'_> {
+impl FaultSearch<'_> {
     fn face(&mut self, rest: &[u8]) {
         for (i, word) in words(rest).enumerate() {
             if let Err(fault) = self.corner(word, count(i) + 1) {

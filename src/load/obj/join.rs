@@ -17,7 +17,7 @@ pub(super) struct Joined {
 
 /// Start of a run of lines in the whole text: counts of what stands before it.
 #[derive(Clone, Copy, Debug, Default)]
-struct Before {
+struct Preceding {
     counts: [u32; 3],
     lines: u32,
     faces: u32,
@@ -32,7 +32,7 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
     let mut out = Statements::default();
     let mut table = Table::new();
     let mut last = Run::default();
-    let mut before = Before::default();
+    let mut before = Preceding::default();
     let (mut begins, mut runs) = (Vec::with_capacity(chunks.len()), Vec::with_capacity(chunks.len()));
     check_sizes(&chunks)?;
     for chunk in &mut chunks {
@@ -49,7 +49,7 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
     let face_spans = face_spans(&chunks, &begins, &runs);
     let is_plain = uvs.is_empty() && normals.is_empty() && colors.is_empty() && table.runs.len() == 1;
     let plain = if is_plain { triangles(&chunks, &begins, counts[0], &face_spans) } else { None };
-    let there = There { counts, uvs: &uvs, normals: &normals };
+    let there = VertexCounts { counts, uvs: &uvs, normals: &normals };
     let (corners, mut faulty) = if plain.is_some() { (Vec::new(), false) } else { corners(&chunks, &begins, &there) };
     let wire_corners = wire_statements(&chunks, &begins, &runs, &there, &mut out);
     faulty |= chunks.iter().any(|c| c.faulty);
@@ -64,7 +64,7 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
 }
 
 /// Faces of all runs of lines, renumbered for the whole text.
-fn face_spans(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<FaceSpan> {
+fn face_spans(chunks: &[Chunk], begins: &[Preceding], runs: &[Vec<u32>]) -> Vec<FaceSpan> {
     let mut all: Vec<FaceSpan> = Vec::with_capacity(chunks.iter().map(|chunk| chunk.faces.len()).sum());
     let mut first = 0;
     for ((chunk, before), runs) in chunks.iter().zip(begins).zip(runs) {
@@ -86,7 +86,7 @@ fn face_spans(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>]) -> Vec<Fac
 
 /// Vertices of the triangles, where the text holds only triangles that name positions alone; `None` otherwise, and where a
 /// vertex is not below `vertices`.
-fn triangles(chunks: &[Chunk], begins: &[Before], vertices: u32, face_spans: &[FaceSpan]) -> Option<Vec<[u32; 3]>> {
+fn triangles(chunks: &[Chunk], begins: &[Preceding], vertices: u32, face_spans: &[FaceSpan]) -> Option<Vec<[u32; 3]>> {
     let is_plain = |span: &FaceSpan| (span.face.arity, span.face.smoothing) == (3, 0);
     let of_faces = |chunk: &Chunk| chunk.wire_statements.is_empty() && chunk.dropped.is_empty() && !chunk.faulty;
     let faces: u64 = chunks.iter().map(|chunk| u64::from(chunk.face_count)).sum();
@@ -97,7 +97,7 @@ fn triangles(chunks: &[Chunk], begins: &[Before], vertices: u32, face_spans: &[F
     let numbers = chunks.iter().map(|chunk| chunk.corners.vertices_alone()).collect::<Option<Vec<&[u32]>>>()?;
     let mut all: Vec<[u32; 3]> = bytemuck::zeroed_vec(usize::try_from(drawn).ok()?);
     let parts = cut(&mut all, numbers.iter().map(|numbers| numbers.len() / 3));
-    let fill = |((part, numbers), before): ((&mut [[u32; 3]], &[u32]), &Before)| {
+    let fill = |((part, numbers), before): ((&mut [[u32; 3]], &[u32]), &Preceding)| {
         part.as_flattened_mut().iter_mut().zip(numbers).all(|(vertex, &number)| {
             // 0 means none; it wraps to a number that is never below `vertices`.
             *vertex = resolve(number, before.counts[0]).unwrap_or(0).wrapping_sub(1);
@@ -122,7 +122,7 @@ fn check_sizes(chunks: &[Chunk]) -> Result<(), u64> {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "sizes were checked to fit")]
-impl Before {
+impl Preceding {
     fn advance(&mut self, chunk: &Chunk) {
         let sizes = [chunk.positions.len(), chunk.uvs.len(), chunk.normals.len()];
         for (count, size) in self.counts.iter_mut().zip(sizes) {
@@ -201,7 +201,7 @@ impl Table {
     }
 }
 
-fn all_colors(chunks: &[Chunk], begins: &[Before], positions: u32) -> Vec<[f32; 3]> {
+fn all_colors(chunks: &[Chunk], begins: &[Preceding], positions: u32) -> Vec<[f32; 3]> {
     let mut all = vec![NO_COLOR; positions as usize];
     for (chunk, before) in chunks.iter().zip(begins) {
         let first = before.counts[0] as usize;
@@ -230,16 +230,16 @@ fn vertices(chunks: &mut [Chunk]) -> (Vec<DVec3>, Vec<DVec2>, Vec<Vec3>) {
 }
 
 /// Vertex data that corners may name.
-struct There<'a> {
+struct VertexCounts<'a> {
     counts: [u32; 3],
     uvs: &'a [DVec2],
     normals: &'a [Vec3],
 }
 
-impl There<'_> {
+impl VertexCounts<'_> {
     /// The corner, and whether it names a vertex, coordinate or normal that does not exist.
     #[inline]
-    fn corner(&self, numbers: &[u32; 3], before: &Before) -> (Corner, bool) {
+    fn corner(&self, numbers: &[u32; 3], before: &Preceding) -> (Corner, bool) {
         let number = |kind: usize| resolve(numbers[kind], before.counts[kind]).filter(|&n| n <= self.counts[kind]);
         let [position, uv, normal] = [number(0), number(1), number(2)];
         // 0 means none.
@@ -259,9 +259,9 @@ impl There<'_> {
 /// Moves points and lines to the whole and returns their corners. Those that name a missing vertex are counted and left out.
 fn wire_statements(
     chunks: &[Chunk],
-    begins: &[Before],
+    begins: &[Preceding],
     runs: &[Vec<u32>],
-    there: &There,
+    there: &VertexCounts,
     out: &mut Statements,
 ) -> Vec<Corner> {
     let mut corners = Vec::with_capacity(chunks.iter().map(|c| c.wire_corners.len()).sum());
@@ -286,11 +286,11 @@ fn wire_statements(
 }
 
 /// Corners of all faces, and whether one of them, or of the dropped faces, names data that does not exist.
-fn corners(chunks: &[Chunk], begins: &[Before], there: &There) -> (Vec<Corner>, bool) {
+fn corners(chunks: &[Chunk], begins: &[Preceding], there: &VertexCounts) -> (Vec<Corner>, bool) {
     // The threads that fill the parts are the ones that touch the pages first.
     let mut all: Vec<Corner> = bytemuck::zeroed_vec(chunks.iter().map(|c| c.corners.len()).sum());
     let parts = cut(&mut all, chunks.iter().map(|chunk| chunk.corners.len()));
-    let fill = |((part, chunk), before): ((&mut [Corner], &Chunk), &Before)| {
+    let fill = |((part, chunk), before): ((&mut [Corner], &Chunk), &Preceding)| {
         let mut faulty = chunk.dropped.iter().any(|numbers| there.corner(numbers, before).1);
         for (i, corner) in part.iter_mut().enumerate() {
             let odd;

@@ -3,14 +3,14 @@
 use super::body::{Body, Missing};
 use super::header::{Element, Encoding, Header, Kind, Property};
 use super::meaning::{
-    ALPHA, COLOR, Light, Meanings, NORMAL, PLACE, RED, SLOTS, UV, Use, Wanted, ends, list_of, uses_in_edges,
+    ALPHA, COLOR, Light, Meanings, NORMAL, PLACE, RED, SLOTS, UV, Use, WantedProperties, ends, list_of, uses_in_edges,
     uses_in_faces,
 };
 use super::packed::Record;
 use super::told::passed_over;
 use crate::load::diagnostic::DAMAGED;
 use crate::load::geometry::NONE;
-use crate::load::geometry::plain_mesh::{PlainMesh, Said};
+use crate::load::geometry::plain_mesh::{FaceAttributes, PlainMesh};
 use crate::load::limits::Budget;
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, Source};
@@ -27,8 +27,8 @@ pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Res
     // Each name is kept here, in the header and as a material's, and in paths.
     let names: usize = header.pictures.iter().map(|(_, name)| name.len()).sum();
     budget.take(names as u64, 4).map_err(|over| Diagnostic::over_budget(&source.path, over))?;
-    let (wanted, bare) = (Wanted::of(header), PlainMesh::showing(header.pictures.clone()));
-    let mut reader = Reader { source, body, vertices, wanted, budget, bare, torn: None, odd: Odd::default() };
+    let (wanted, bare) = (WantedProperties::of(header), PlainMesh::showing(header.pictures.clone()));
+    let mut reader = Reader { source, body, vertices, wanted, budget, bare, torn: None, odd: OddFaces::default() };
     for element in &header.elements {
         if let Err(fault) = reader.element(element) {
             // An invalid value may result from a malformed line far before it.
@@ -53,24 +53,24 @@ struct Reader<'a, 'b> {
     body: Body<'a>,
     /// Number of vertices that the header claims; faces may come before them.
     vertices: u64,
-    wanted: Wanted,
+    wanted: WantedProperties,
     budget: &'b mut Budget,
     bare: PlainMesh,
     /// Warning about a line whose count of numbers does not match its row.
     torn: Option<Diagnostic>,
-    odd: Odd,
+    odd: OddFaces,
 }
 
 /// Faces whose texture coordinates or picture are invalid: number of faces, and index of the first.
 #[derive(Default)]
-struct Odd {
+struct OddFaces {
     /// Faces without two coordinates per corner.
     uneven: (u32, u64),
     /// Faces that name a picture that does not exist.
     no_picture: (u32, u64),
 }
 
-impl Odd {
+impl OddFaces {
     fn count((count, first): &mut (u32, u64), face: u64) {
         if *count == 0 {
             *first = face;
@@ -341,12 +341,12 @@ impl Reader<'_, '_> {
         let uvs = match row.uvs.as_chunks() {
             (uvs, []) if uvs.is_empty() || uvs.len() == row.corners.len() => uvs,
             _ => {
-                Odd::count(&mut self.odd.uneven, i);
+                OddFaces::count(&mut self.odd.uneven, i);
                 &[]
             }
         };
         let picture = row.picture.map(|number| self.picture(i, number));
-        self.face(&row.corners, &Said { uvs, color: row.color, picture })
+        self.face(&row.corners, &FaceAttributes { uvs, color: row.color, picture })
     }
 
     /// Index of the picture that face `i` names; none for numbers below 0.
@@ -354,7 +354,7 @@ impl Reader<'_, '_> {
         let is_there = number >= 0.0 && number < self.bare.pictures.len() as f64 && number.fract() == 0.0;
         if !is_there {
             if number >= 0.0 || number.is_nan() {
-                Odd::count(&mut self.odd.no_picture, i);
+                OddFaces::count(&mut self.odd.no_picture, i);
             }
             return NONE;
         }
@@ -484,14 +484,14 @@ impl Reader<'_, '_> {
                 if color.is_some() {
                     self.take(1, PlainMesh::COLOR)?;
                 }
-                self.face(&[a, b, c], &Said { color, ..Said::default() })?;
+                self.face(&[a, b, c], &FaceAttributes { color, ..FaceAttributes::default() })?;
             }
         }
         Ok(())
     }
 
     /// Adds a face whose memory was taken.
-    fn face(&mut self, corners: &[u32], said: &Said) -> Result<(), Diagnostic> {
+    fn face(&mut self, corners: &[u32], said: &FaceAttributes) -> Result<(), Diagnostic> {
         let most = self.bare.corners.len().max(self.bare.arities.len()) as u64 + corners.len() as u64;
         if most > PlainMesh::LARGEST {
             let text = format!("more than {} faces or corners", PlainMesh::LARGEST);

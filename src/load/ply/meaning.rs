@@ -115,14 +115,14 @@ fn unit(kind: Kind) -> f64 {
 
 /// Which properties of faces and edges are read.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Wanted {
+pub(super) struct WantedProperties {
     /// Whether their colours are read: not where vertices have colours, which are finer.
     pub colors: bool,
     /// Whether the texture coordinates and pictures of corners are read: only where the file names pictures.
     pub pictures: bool,
 }
 
-impl Wanted {
+impl WantedProperties {
     pub(super) fn of(header: &Header) -> Self {
         let vertex = header.elements.iter().find(|element| element.name == "vertex" && element.count > 0);
         let slots = vertex.map(|element| Meanings::of(element).slots).unwrap_or_default();
@@ -149,7 +149,7 @@ pub(super) enum Use {
 
 /// Use of each property of faces whose corners are in `list`; for strips, whose triangles share corners, only corners and
 /// colours are used.
-pub(super) fn uses_in_faces(face: &Element, list: usize, strips: bool, wanted: Wanted) -> Vec<Use> {
+pub(super) fn uses_in_faces(face: &Element, list: usize, strips: bool, wanted: WantedProperties) -> Vec<Use> {
     let of = |(k, property): (usize, &Property)| match (property.name.as_str(), property.length) {
         _ if k == list => Use::Corners,
         ("texcoord", Some(_)) if wanted.pictures && !strips => Use::Uvs,
@@ -160,7 +160,7 @@ pub(super) fn uses_in_faces(face: &Element, list: usize, strips: bool, wanted: W
 }
 
 /// Use of each property of edges with these ends.
-pub(super) fn uses_in_edges(edge: &Element, ends: [usize; 2], wanted: Wanted) -> Vec<Use> {
+pub(super) fn uses_in_edges(edge: &Element, ends: [usize; 2], wanted: WantedProperties) -> Vec<Use> {
     let of = |k| match ends.iter().position(|&end| end == k) {
         Some(end) => Use::End(end),
         None => light_in(edge, k, wanted),
@@ -175,7 +175,7 @@ pub(super) fn are_colored(element: &Element) -> bool {
 }
 
 /// Colour channel of the `k`th property, if it is the first for that channel.
-fn light_in(element: &Element, k: usize, wanted: Wanted) -> Use {
+fn light_in(element: &Element, k: usize, wanted: WantedProperties) -> Use {
     let (before, rest) = element.properties.split_at(k);
     let part = (RED..=ALPHA).find(|&slot| rest.first().is_some_and(|property| is_in(property, slot)));
     let first = part.filter(|&slot| !before.iter().any(|property| is_in(property, slot)));

@@ -1,7 +1,7 @@
 //! Warnings about contents of a PLY file that are not drawn.
 
 use super::header::{Element, Header};
-use super::meaning::{Meanings, Wanted, are_colored, are_splats, list_of};
+use super::meaning::{Meanings, WantedProperties, are_colored, are_splats, list_of};
 use crate::load::Diagnostic;
 use crate::load::paths::shorten;
 use std::path::Path;
@@ -10,7 +10,7 @@ use std::path::Path;
 pub(super) fn passed_over(header: &Header, file: &Path) -> Vec<Diagnostic> {
     let warning = |code, text: String, remedy: &str| Diagnostic::new(code, file, "", text).remedy(remedy);
     let mut told = Vec::new();
-    let wanted = Wanted::of(header);
+    let wanted = WantedProperties::of(header);
     for (name, code) in [("face", "ply-face-colors"), ("edge", "ply-edge-colors")] {
         let mut some = header.elements.iter().filter(|element| element.name == name && element.count > 0);
         if !wanted.colors && some.any(are_colored) {

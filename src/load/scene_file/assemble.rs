@@ -70,11 +70,11 @@ struct Assembly<'a> {
     facts: Facts,
     warnings: Warnings,
     /// Models by file, up axis and material: one that occurs again is read and stored once.
-    known: HashMap<(String, Option<UpAxis>, Option<u32>), Known>,
+    known: HashMap<(String, Option<UpAxis>, Option<u32>), ReadModel>,
 }
 
 /// A model that was read, for further placements.
-struct Known {
+struct ReadModel {
     places: Scene,
     stored: Stored,
     facts: Facts,
@@ -124,7 +124,7 @@ impl Assembly<'_> {
     }
 
     /// Reads a model and adds it.
-    fn add_first(&mut self, model: &Model) -> Result<Known, LoadError> {
+    fn add_first(&mut self, model: &Model) -> Result<ReadModel, LoadError> {
         // Temporary memory of reading is free again for the next model.
         let mut own = *self.budget;
         let Loaded { scene, warnings, facts } = self.read(model, &mut own)?;
@@ -135,7 +135,7 @@ impl Assembly<'_> {
         self.facts.decoding += facts.decoding;
         let places = scene.places();
         let stored = self.scene.append(scene, &model.world_from_model);
-        Ok(Known { places, stored, facts })
+        Ok(ReadModel { places, stored, facts })
     }
 
     /// Takes `bytes` bytes for a model.

@@ -146,7 +146,7 @@ mod weight;
 
 use self::assemble::assemble;
 use self::reader::{Faults, Table, color, number, string, word};
-use self::shapes::Lost;
+use self::shapes::UndrawnShapes;
 use self::weight::weight;
 use super::limits::Budget;
 use super::{Diagnostic, LoadError, LoadOptions, Loaded, Source};
@@ -204,7 +204,7 @@ struct Parsed {
     scene: Scene,
     models: Vec<Model>,
     panorama: Option<Surrounding>,
-    lost: Lost,
+    lost: UndrawnShapes,
     /// Largest displacement of a vertex by rounding to `f32`, world units.
     max_rounding: f64,
 }
@@ -249,7 +249,7 @@ fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -
     for table in root.tables("models", "model") {
         models.extend(model(&mut scene, &mut names, table));
     }
-    let mut lost = Lost::default();
+    let mut lost = UndrawnShapes::default();
     let max_rounding = add_shapes(&root, &mut scene, &mut names, &mut lost);
     for table in root.tables("lights", "light") {
         match view::light(table) {
@@ -268,7 +268,7 @@ fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -
 }
 
 /// Adds the file's own shapes; returns the largest displacement of a vertex by rounding.
-fn add_shapes(root: &Table, scene: &mut Scene, names: &mut Names, lost: &mut Lost) -> f64 {
+fn add_shapes(root: &Table, scene: &mut Scene, names: &mut Names, lost: &mut UndrawnShapes) -> f64 {
     let mut inline = Vec::new();
     for table in root.tables("meshes", "mesh") {
         let material = names.material(scene, &table);

@@ -13,14 +13,14 @@ use toml::de::DeValue;
 
 /// Counts of shapes that could not be drawn, each with the byte offset of the first.
 #[derive(Default)]
-pub(super) struct Lost {
+pub(super) struct UndrawnShapes {
     /// Shapes and faces with a coordinate or size that counts as infinite.
     far: (u64, usize),
     /// Triangles that collapsed by rounding.
     collapsed: (u64, usize),
 }
 
-impl Lost {
+impl UndrawnShapes {
     /// Reports the counts in the facts and as warnings.
     pub(super) fn tell(self, faults: &Faults, file: &Path, facts: &mut Facts, warnings: &mut Warnings) {
         for (why, (count, at)) in [(&LeftOut::TOO_FAR, self.far), (&LeftOut::COLLAPSED, self.collapsed)] {
@@ -55,7 +55,7 @@ pub(super) struct Inline {
 }
 
 /// Reads one inline mesh.
-pub(super) fn mesh(table: Table, material: u32, lost: &mut Lost) -> Option<Inline> {
+pub(super) fn mesh(table: Table, material: u32, lost: &mut UndrawnShapes) -> Option<Inline> {
     let at = table.span.start;
     let name = table.get("name", string).unwrap_or_default();
     let positions = table.need("positions", each(vec));
@@ -102,7 +102,7 @@ fn used(mesh: &mut Mesh, positions: Vec<DVec3>) -> Vec<DVec3> {
 /// Rounds the coordinates of inline meshes and adds them to the scene; returns the largest displacement, world units.
 ///
 /// Meshes with the same placement share a centre, so that touching ones are recognized as standing together.
-pub(super) fn place(inline: Vec<Inline>, scene: &mut Scene, lost: &mut Lost) -> f64 {
+pub(super) fn place(inline: Vec<Inline>, scene: &mut Scene, lost: &mut UndrawnShapes) -> f64 {
     let key = |place: &DAffine3| place.to_cols_array().map(f64::to_bits);
     let mut boxes: HashMap<[u64; 12], (DVec3, DVec3)> = HashMap::new();
     for part in &inline {
@@ -169,7 +169,7 @@ fn check_faces(table: &Table, positions: usize, faces: &[Vec<u32>]) {
 }
 
 /// Reads one sphere.
-pub(super) fn sphere(table: Table, material: u32, lost: &mut Lost) -> Option<Sphere> {
+pub(super) fn sphere(table: Table, material: u32, lost: &mut UndrawnShapes) -> Option<Sphere> {
     let at = table.span.start;
     let name = table.get("name", string).unwrap_or_default();
     let center = table.need("center", vec);
@@ -180,7 +180,7 @@ pub(super) fn sphere(table: Table, material: u32, lost: &mut Lost) -> Option<Sph
 }
 
 /// Reads one cone.
-pub(super) fn cone(table: Table, material: u32, lost: &mut Lost) -> Option<Cone> {
+pub(super) fn cone(table: Table, material: u32, lost: &mut UndrawnShapes) -> Option<Cone> {
     let at = table.span.start;
     let name = table.get("name", string).unwrap_or_default();
     let (base, apex) = ends(&table, "base", "apex");
@@ -195,7 +195,7 @@ pub(super) fn cone(table: Table, material: u32, lost: &mut Lost) -> Option<Cone>
 }
 
 /// Reads one cylinder: a cone with equal radii.
-pub(super) fn cylinder(table: Table, material: u32, lost: &mut Lost) -> Option<Cone> {
+pub(super) fn cylinder(table: Table, material: u32, lost: &mut UndrawnShapes) -> Option<Cone> {
     let at = table.span.start;
     let name = table.get("name", string).unwrap_or_default();
     let (base, top) = ends(&table, "base", "top");
@@ -204,7 +204,7 @@ pub(super) fn cylinder(table: Table, material: u32, lost: &mut Lost) -> Option<C
     drawn(Cone { name, base: base?, base_radius: radius?, apex: top?, apex_radius: radius?, material }, at, lost)
 }
 
-fn drawn(cone: Cone, at: usize, lost: &mut Lost) -> Option<Cone> {
+fn drawn(cone: Cone, at: usize, lost: &mut UndrawnShapes) -> Option<Cone> {
     let radii = DVec3::new(cone.base_radius, cone.apex_radius, 0.0);
     lost.is_drawn(&[cone.base, cone.apex, radii], at).then_some(cone)
 }
@@ -220,7 +220,7 @@ fn ends(table: &Table, first: &'static str, second: &'static str) -> (Option<DVe
 }
 
 /// Reads one plane.
-pub(super) fn plane(table: Table, material: u32, lost: &mut Lost) -> Option<Plane> {
+pub(super) fn plane(table: Table, material: u32, lost: &mut UndrawnShapes) -> Option<Plane> {
     let at = table.span.start;
     let name = table.get("name", string).unwrap_or_default();
     let normal = table.need("normal", direction);

@@ -39,15 +39,15 @@ const TABLES: u32 = 12;
 
 /// Bytes that a corner takes during welding; the slots take little beside, since tables are many.
 pub(super) const fn cost<P>() -> u64 {
-    (size_of::<Card<P>>() + 3 * size_of::<u32>()) as u64
+    (size_of::<PositionEntry<P>>() + 3 * size_of::<u32>()) as u64
 }
 
 /// Makes one vertex of all corners with equal positions. There are at most [`LARGEST`] corners.
 pub(super) fn weld<P: Pod + Eq + Send + Sync>(corners: usize, place: impl Fn(usize) -> P + Sync) -> Welded {
     let hash = Hash { seed: RandomState::new().hash_one(0), bits: (corners / TABLE).max(1).ilog2().min(TABLES) };
-    let hands: Vec<Hand<P>> = (0..corners.div_ceil(DEALT))
+    let hands: Vec<SortedRun<P>> = (0..corners.div_ceil(DEALT))
         .into_par_iter()
-        .map(|part| Hand::deal(part * DEALT..corners.min((part + 1) * DEALT), &place, &hash))
+        .map(|part| SortedRun::deal(part * DEALT..corners.min((part + 1) * DEALT), &place, &hash))
         .collect();
     let first: Vec<AtomicU32> = (0..corners).into_par_iter().map(|_| AtomicU32::new(0)).collect();
     let fill = |slots: &mut Slots<P>, table| {
@@ -88,12 +88,12 @@ impl Hash {
 
 /// A position, and a corner there.
 #[derive(Clone, Copy)]
-struct Card<P> {
+struct PositionEntry<P> {
     place: P,
     corner: u32,
 }
 
-impl<P: Pod> Card<P> {
+impl<P: Pod> PositionEntry<P> {
     /// Marks an empty slot.
     fn none() -> Self {
         Self { place: P::zeroed(), corner: u32::MAX }
@@ -105,13 +105,13 @@ impl<P: Pod> Card<P> {
 }
 
 /// Consecutive corners, sorted by table.
-struct Hand<P> {
-    cards: Vec<Card<P>>,
+struct SortedRun<P> {
+    cards: Vec<PositionEntry<P>>,
     /// Start of the cards of each table, and the end.
     starts: Vec<u32>,
 }
 
-impl<P: Pod> Hand<P> {
+impl<P: Pod> SortedRun<P> {
     #[expect(clippy::cast_possible_truncation, reason = "corners are few enough")]
     fn deal(corners: Range<usize>, place: &impl Fn(usize) -> P, hash: &Hash) -> Self {
         let places = corners.clone().map(place);
@@ -124,23 +124,23 @@ impl<P: Pod> Hand<P> {
             *start = sum;
         });
         let mut next = starts.clone();
-        let mut cards = vec![Card::none(); tables.len()];
+        let mut cards = vec![PositionEntry::none(); tables.len()];
         for ((place, corner), table) in places.zip(corners).zip(tables) {
             let at = &mut next[table as usize];
-            cards[*at as usize] = Card { place, corner: corner as u32 };
+            cards[*at as usize] = PositionEntry { place, corner: corner as u32 };
             *at += 1;
         }
         Self { cards, starts }
     }
 
-    fn of_table(&self, table: usize) -> &[Card<P>] {
+    fn of_table(&self, table: usize) -> &[PositionEntry<P>] {
         &self.cards[self.starts[table] as usize..self.starts[table + 1] as usize]
     }
 }
 
 /// Hash table with open addressing: the first card of each position of a table; at most half full.
 struct Slots<P> {
-    slots: Vec<Card<P>>,
+    slots: Vec<PositionEntry<P>>,
     places: usize,
 }
 
@@ -148,16 +148,16 @@ impl<P: Pod + Eq> Slots<P> {
     /// Table with room for [`TABLE`] corners, or for `corners` if fewer.
     fn new(corners: usize) -> Self {
         let room = 2 * corners.clamp(1, TABLE).next_power_of_two();
-        Self { slots: vec![Card::none(); room], places: 0 }
+        Self { slots: vec![PositionEntry::none(); room], places: 0 }
     }
 
     fn clear(&mut self) {
-        self.slots.fill(Card::none());
+        self.slots.fill(PositionEntry::none());
         self.places = 0;
     }
 
     /// First corner at the position of this card; the card's own if there was none before.
-    fn first(&mut self, card: Card<P>, hash: &Hash) -> u32 {
+    fn first(&mut self, card: PositionEntry<P>, hash: &Hash) -> u32 {
         let at = self.find(&card, hash);
         if !self.slots[at].is_none() {
             return self.slots[at].corner;
@@ -171,7 +171,7 @@ impl<P: Pod + Eq> Slots<P> {
     }
 
     /// Slot of a position, or the empty slot where it belongs.
-    fn find(&self, card: &Card<P>, hash: &Hash) -> usize {
+    fn find(&self, card: &PositionEntry<P>, hash: &Hash) -> usize {
         let mut at = hash.slot(&card.place, self.slots.len());
         while !self.slots[at].is_none() && self.slots[at].place != card.place {
             at = (at + 1) & (self.slots.len() - 1);
@@ -180,7 +180,7 @@ impl<P: Pod + Eq> Slots<P> {
     }
 
     fn double(&mut self, hash: &Hash) {
-        let twice = vec![Card::none(); 2 * self.slots.len()];
+        let twice = vec![PositionEntry::none(); 2 * self.slots.len()];
         let before = std::mem::replace(&mut self.slots, twice);
         for card in before.into_iter().filter(|card| !card.is_none()) {
             let at = self.find(&card, hash);

@@ -73,7 +73,7 @@ pub(super) fn render_all<A: Accel, P: Observer>(
     let judge = Judge::new(frame, how);
     let tracer = |_| Mutex::new(Tracer::<_, P>::new(context, accel, progress));
     let tracers: Vec<_> = (0..rayon::current_num_threads()).map(tracer).collect();
-    let crew = Crew { frame, tracers };
+    let crew = ThreadTracers { frame, tracers };
     let columns = tiles.iter().take_while(|tile| tile.y0 == tiles[0].y0).count().max(1);
     let (mut finished, mut above) = (0, Vec::new());
     for tiles_of_band in tiles.chunks(columns * BAND.div_ceil(columns)) {
@@ -92,12 +92,12 @@ pub(super) fn render_all<A: Accel, P: Observer>(
 }
 
 /// A tracer for each thread.
-struct Crew<'a, A: Accel, P> {
+struct ThreadTracers<'a, A: Accel, P> {
     frame: &'a Frame<'a>,
     tracers: Vec<Mutex<Tracer<'a, A, P>>>,
 }
 
-impl<A: Accel, P: Observer> Crew<'_, A, P> {
+impl<A: Accel, P: Observer> ThreadTracers<'_, A, P> {
     /// Renders a band until no quadrant in it is worth splitting; `None` when cancelled.
     fn finish(&self, band: &mut Band, judge: &Judge) -> Option<()> {
         loop {

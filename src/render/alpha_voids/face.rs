@@ -94,7 +94,7 @@ impl Face {
     /// What is certain where some rays hit the plane; maps are read at full resolution where cones have no width, or for
     /// [`SHARP`] faces.
     #[inline(always)]
-    pub(super) fn sure<const N: usize>(&self, map: &Survey, rays: &Rays<N>) -> Sure {
+    pub(super) fn sure<const N: usize>(&self, map: &Survey, rays: &Rays<N>) -> KnownOpacity {
         let backs_count = rays.looks & (self.flags & ONE_SIDED != 0);
         let growth = if self.flags & SHARP == 0 { self.growth } else { 0.0 };
         let (mut at, mut needed) = ([[0.0; N]; 2], [0.0; N]);
@@ -117,7 +117,7 @@ impl Face {
         }
         let room = map.room(&at);
         // NaN compares as false.
-        (0..N).fold(Sure { clear: 0, solid: 0 }, |Sure { clear, solid }, i| Sure {
+        (0..N).fold(KnownOpacity { clear: 0, solid: 0 }, |KnownOpacity { clear, solid }, i| KnownOpacity {
             clear: clear | u32::from(needed[i] <= room[i]) << i,
             solid: solid | u32::from(needed[i] <= -room[i]) << i,
         })
@@ -137,7 +137,7 @@ pub(super) struct Sight<'r> {
 
 /// Masks of rays that hit a face where its opacity is known.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sure {
+pub(super) struct KnownOpacity {
     /// Rays that hit a gap.
     pub(super) clear: u32,
     /// Rays that hit a solid part; for rays that look for surfaces this is unused: the hit is shaded in any case.
@@ -173,10 +173,10 @@ impl<const N: usize> Rays<N> {
 pub(super) struct Eight<'r>(pub(super) &'r Face, pub(super) &'r Survey, pub(super) Rays<LANES>);
 
 impl Kernel for Eight<'_> {
-    type Output = Sure;
+    type Output = KnownOpacity;
 
     #[inline(always)]
-    fn run<S: Simd>(self, _: S) -> Sure {
+    fn run<S: Simd>(self, _: S) -> KnownOpacity {
         let Self(face, map, rays) = self;
         face.sure(map, &rays)
     }

@@ -48,21 +48,21 @@ pub(crate) struct AlphaVoids<'a> {
     /// Runs of stored prims that are faces of masked meshes, in order, each with the number of such prims before it.
     runs: Vec<(Range<u32>, usize)>,
     count: usize,
-    maps: Late<Maps>,
+    maps: OnDemand<Maps>,
     /// In the order of the runs. Computing all is worth it once as many rays have hit any.
-    faces: Late<Vec<Face>>,
+    faces: OnDemand<Vec<Face>>,
 }
 
 /// A value computed after enough requests; until then, and while a thread computes it, callers do without.
 #[derive(Debug)]
-struct Late<T> {
+struct OnDemand<T> {
     enough: usize,
     asked: AtomicUsize,
     taken: AtomicBool,
     found: OnceLock<T>,
 }
 
-impl<T> Late<T> {
+impl<T> OnDemand<T> {
     fn after(enough: usize) -> Self {
         Self { enough, asked: AtomicUsize::new(0), taken: AtomicBool::new(false), found: OnceLock::new() }
     }
@@ -153,8 +153,8 @@ impl<'a> AlphaVoids<'a> {
             masked_meshes,
             runs,
             count,
-            maps: Late::after(enough),
-            faces: if count > MOST { Late::never() } else { Late::after(count) },
+            maps: OnDemand::after(enough),
+            faces: if count > MOST { OnDemand::never() } else { OnDemand::after(count) },
         })
     }
 

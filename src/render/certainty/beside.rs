@@ -3,7 +3,7 @@
 //! The formulas of `frame` and of the developer are called in loops over pixels, which the compiler vectorises. So a pixel has
 //! the same bits whatever its neighbours, on every instruction set.
 
-use super::{Certainty, GROUPS, Range, Seen, Shown};
+use super::{Certainty, GROUPS, PixelSummary, Range, Shown};
 use crate::math::simd::{Kernel, LANES, Simd};
 use crate::math::{Vec3, Vec4};
 use crate::render::frame::Sum;
@@ -79,7 +79,7 @@ impl Sums {
 }
 
 /// Pixels that wait to be evaluated together.
-struct Beside<'g> {
+struct PixelBatch<'g> {
     sums: [Sums; GROUPS],
     /// Groups of the last pixel.
     last: &'g [Sum],
@@ -101,7 +101,11 @@ struct Found {
 impl Certainty<'_> {
     /// Passes what the sample groups of each of these pixels show to `tell`: all pixels have the same number of groups, at most
     /// [`GROUPS`].
-    pub(in crate::render) fn see_each<'g>(&self, pixels: impl Iterator<Item = &'g [Sum]>, mut tell: impl FnMut(&Seen)) {
+    pub(in crate::render) fn see_each<'g>(
+        &self,
+        pixels: impl Iterator<Item = &'g [Sum]>,
+        mut tell: impl FnMut(&PixelSummary),
+    ) {
         self.look_at_each(pixels, true, |found, i| tell(&found.at(i)));
     }
 
@@ -119,7 +123,7 @@ impl Certainty<'_> {
     pub(in crate::render) fn see_samples(&self, samples: &[Sample]) -> (Shown, Pixels) {
         let (mut shown, mut pixels) = (Shown::with_capacity(samples.len()), Pixels::default());
         pixels.beauty.reserve(samples.len());
-        self.level.run(Singles { judge: self, samples, shown: &mut shown, pixels: &mut pixels });
+        self.level.run(SummarizeSamples { judge: self, samples, shown: &mut shown, pixels: &mut pixels });
         (shown, pixels)
     }
 
@@ -129,7 +133,7 @@ impl Certainty<'_> {
         range: bool,
         mut tell: impl FnMut(&Found, usize),
     ) {
-        let mut beside = Beside::new();
+        let mut beside = PixelBatch::new();
         for groups in pixels {
             if beside.is_full_for(groups) {
                 beside.look(self, range, &mut tell);
@@ -140,7 +144,7 @@ impl Certainty<'_> {
     }
 }
 
-impl<'g> Beside<'g> {
+impl<'g> PixelBatch<'g> {
     fn new() -> Self {
         let (row, rows) = ([0.0; PIXELS], [[0.0; PIXELS]; 4]);
         let seen = Found { color: rows, least: rows, most: rows, brightest: row, error: row };
@@ -170,9 +174,9 @@ impl<'g> Beside<'g> {
     fn look(&mut self, judge: &Certainty, range: bool, mut tell: impl FnMut(&Found, usize)) {
         let (sums, to) = (&self.sums[..self.last.len().min(GROUPS)], &mut self.seen);
         if range {
-            judge.level.run(See { judge, sums, to });
+            judge.level.run(SummarizePixels { judge, sums, to });
         } else {
-            judge.level.run(Doubt { judge, sums, to });
+            judge.level.run(StandardErrors { judge, sums, to });
         }
         for (i, alike) in self.alike[..self.pixels].iter().enumerate() {
             (0..*alike).for_each(|_| tell(to, i));
@@ -182,21 +186,21 @@ impl<'g> Beside<'g> {
 }
 
 impl Found {
-    fn at(&self, i: usize) -> Seen {
+    fn at(&self, i: usize) -> PixelSummary {
         let color = |[r, g, b, a]: &Rows| Vec4::new(r[i], g[i], b[i], a[i]);
         let range = Range { least: color(&self.least), most: color(&self.most), brightest: self.brightest[i] };
-        Seen { color: color(&self.color), range, error: self.error[i] }
+        PixelSummary { color: color(&self.color), range, error: self.error[i] }
     }
 }
 
 /// Kernel that evaluates all results.
-struct See<'a, 'j> {
+struct SummarizePixels<'a, 'j> {
     judge: &'a Certainty<'j>,
     sums: &'a [Sums],
     to: &'a mut Found,
 }
 
-impl Kernel for See<'_, '_> {
+impl Kernel for SummarizePixels<'_, '_> {
     type Output = ();
 
     // The lanes are plain arrays: the token `S` only tells which instructions the compiler may use.
@@ -236,14 +240,14 @@ impl Kernel for See<'_, '_> {
 }
 
 /// Kernel that evaluates single samples.
-struct Singles<'a, 'j> {
+struct SummarizeSamples<'a, 'j> {
     judge: &'a Certainty<'j>,
     samples: &'a [Sample],
     shown: &'a mut Shown,
     pixels: &'a mut Pixels,
 }
 
-impl Kernel for Singles<'_, '_> {
+impl Kernel for SummarizeSamples<'_, '_> {
     type Output = ();
 
     #[inline(always)]
@@ -280,13 +284,13 @@ impl Kernel for Singles<'_, '_> {
 }
 
 /// Kernel that evaluates standard errors alone.
-struct Doubt<'a, 'j> {
+struct StandardErrors<'a, 'j> {
     judge: &'a Certainty<'j>,
     sums: &'a [Sums],
     to: &'a mut Found,
 }
 
-impl Kernel for Doubt<'_, '_> {
+impl Kernel for StandardErrors<'_, '_> {
     type Output = ();
 
     #[inline(always)]

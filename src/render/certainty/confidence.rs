@@ -27,17 +27,17 @@ pub(in crate::render) fn factor(confidence: f64) -> f32 {
 fn found(confidence: f64) -> f32 {
     let wrong = 1.0 - confidence;
     let student = zero(|t| 1.0 - student_within(t) - wrong);
-    let looks = Looks::new();
+    let looks = RoundSequences::new();
     student.max(zero(|f| looks.wrong_stops(f) - wrong)) as f32
 }
 
 /// Sequences of rounds of pixels that start with different errors.
-struct Looks {
+struct RoundSequences {
     /// For each start, ρ at each round, and the probability that the mean is off by more than that.
     of_start: Vec<Vec<(f64, f64)>>,
 }
 
-impl Looks {
+impl RoundSequences {
     fn new() -> Self {
         /// Factor by which each round lowers the standard error at least.
         const GAIN: f64 = std::f64::consts::SQRT_2;
@@ -137,7 +137,7 @@ mod tests {
         assert!(factors.windows(2).all(|pair| pair[0] < pair[1]), "{factors:?}");
         assert!(factors[2] > 2.364);
         for confidence in [0.8, 0.95, 0.99] {
-            assert!(Looks::new().wrong_stops(factor(confidence).into()) <= 1.0 - confidence + 1e-6);
+            assert!(RoundSequences::new().wrong_stops(factor(confidence).into()) <= 1.0 - confidence + 1e-6);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Compares single samples with their neighbours, side by side: most of a picture needs no second sample.
 
-use super::{Certainty, Range, Seen};
+use super::{Certainty, PixelSummary, Range};
 use crate::math::Vec4;
 use crate::math::simd::{Kernel, Simd};
 use std::ops::Range as Run;
@@ -34,12 +34,12 @@ impl Shown {
     }
 
     /// What the sample at a place shows.
-    pub(in crate::render) fn at(&self, i: usize) -> Seen {
+    pub(in crate::render) fn at(&self, i: usize) -> PixelSummary {
         let color = Vec4::from_array(std::array::from_fn(|c| self.colors[c][i]));
         if color.is_nan() {
-            return Seen::NOTHING;
+            return PixelSummary::NOTHING;
         }
-        Seen { color, range: Range { least: color, most: color, brightest: self.brightest[i] }, error: 0.0 }
+        PixelSummary { color, range: Range { least: color, most: color, brightest: self.brightest[i] }, error: 0.0 }
     }
 
     /// All columns.

@@ -91,7 +91,7 @@ impl<'a> Certainty<'a> {
 
     /// Whether the detail that makes a pixel uneven is thinner than a pixel: of the nine pixels around and including it, fewer
     /// than three lie on one side of the middle of its range. An edge has at least three on each side.
-    pub(super) fn is_thin(&self, own: &Range, around: impl Iterator<Item = Seen>) -> bool {
+    pub(super) fn is_thin(&self, own: &Range, around: impl Iterator<Item = PixelSummary>) -> bool {
         let (wide, middle) = (own.most - own.least, (own.least + own.most) * 0.5);
         let channel = (0..self.channels()).fold(0, |most, c| if wide[c] > wide[most] { c } else { most });
         let (mut above, mut below) = (0, 0);
@@ -188,7 +188,7 @@ impl<'a> Certainty<'a> {
 
 /// What the samples of a pixel show, in values of the written picture.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct PixelSummary {
     /// Colour of the mean, up to the curvature of the tone curve.
     pub color: Vec4,
     /// Range of the samples.
@@ -197,7 +197,7 @@ pub(super) struct Seen {
     pub error: f32,
 }
 
-impl Seen {
+impl PixelSummary {
     /// No samples: agrees with everything.
     pub(super) const NOTHING: Self = Self { color: Vec4::NAN, range: Range::NOTHING, error: 0.0 };
 }
@@ -231,8 +231,8 @@ mod tests {
     use crate::math::random::Random;
     use crate::render::sobol::mix;
 
-    fn see(judge: &Certainty, groups: &[Sum]) -> Seen {
-        let mut seen = Seen::NOTHING;
+    fn see(judge: &Certainty, groups: &[Sum]) -> PixelSummary {
+        let mut seen = PixelSummary::NOTHING;
         judge.see_each([groups].into_iter(), |all| seen = *all);
         seen
     }
@@ -277,7 +277,7 @@ mod tests {
         assert!(is_thin([1.0, 1.0, 1.0, 1.0, 0.5, 1.0, 1.0, 1.0, 1.0]));
         // At the border of the picture: an edge with no pixels beyond it.
         let mut at_border = seen([0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 1.0, 1.0, 1.0]);
-        at_border[6..].fill(Seen::NOTHING);
+        at_border[6..].fill(PixelSummary::NOTHING);
         assert!(judge.is_thin(&own.range, at_border.into_iter()));
     }
 

@@ -63,7 +63,7 @@ pub(crate) struct ShadingBatch {
     pub(super) samples: [u32; POINTS],
     /// Weight of each point; `None` where all are 1.
     pub(super) weights: Option<Columns>,
-    pub(super) given: Given,
+    pub(super) given: HitData,
     pub(super) found: Found,
     pub(super) painted: Painted,
     /// Texels of the maps of lobes, where they are read side by side.
@@ -81,7 +81,7 @@ pub(crate) struct ShadingBatch {
 
 /// Data of the hits.
 #[repr(C, align(64))]
-pub(super) struct Given {
+pub(super) struct HitData {
     origin: Columns,
     dir: Columns,
     /// Barycentric coordinates of the second and third corner.
@@ -111,7 +111,7 @@ const EMPTY: Columns = [[0.0; POINTS]; 3];
 
 impl Default for ShadingBatch {
     fn default() -> Self {
-        let given = Given { origin: EMPTY, dir: EMPTY, weights: [[0.0; POINTS]; 2], faces: Faces::EMPTY };
+        let given = HitData { origin: EMPTY, dir: EMPTY, weights: [[0.0; POINTS]; 2], faces: Faces::EMPTY };
         let found = Found {
             certain: [0; POINTS],
             front: [0; POINTS],
@@ -220,7 +220,7 @@ pub(super) fn padded(count: usize) -> usize {
 }
 
 struct Gather<'a> {
-    given: &'a mut Given,
+    given: &'a mut HitData,
     hit: &'a [(u32, u32)],
     sorted: &'a HitsByInstance,
     traced: TracedRays<'a>,
@@ -263,7 +263,7 @@ impl Kernel for Gather<'_> {
 }
 
 struct Faceted<'a> {
-    given: &'a Given,
+    given: &'a HitData,
     found: &'a mut Found,
     points: usize,
 }
@@ -287,7 +287,7 @@ impl Kernel for Faceted<'_> {
 }
 
 struct Smooth<'a> {
-    given: &'a Given,
+    given: &'a HitData,
     found: &'a mut Found,
     points: usize,
     placement: &'a Placement,
@@ -313,7 +313,7 @@ impl Kernel for Smooth<'_> {
     }
 }
 
-impl Given {
+impl HitData {
     /// Computes position and error bound.
     #[inline(always)]
     fn place(&self, found: &mut Found, i: usize) {

@@ -1,7 +1,7 @@
 //! Footprints of ray cones at the points of a batch, and the curvature of the surface within: they determine the width of narrow
 //! highlights, and the cones of mirror rays.
 
-use super::columns::{Column, Columns, Found, Given, POINTS, ShadingBatch, get, leave, padded, put};
+use super::columns::{Column, Columns, Found, HitData, POINTS, ShadingBatch, get, leave, padded, put};
 use super::constants::MaterialConstants;
 use super::painted::Painted;
 use crate::accel::{Hit, NO_PRIM, Ray};
@@ -80,7 +80,7 @@ impl ShadingBatch {
             let (Path { cone_width, cone_spread, .. }, hit) = (traced.path(ray as usize), &traced.hits()[ray as usize]);
             (cones.width[i], cones.spread[i]) = (cone_width + cone_spread * hit.t, cone_spread);
         }
-        self.level.run(Print { found, cones, points: padded(count) });
+        self.level.run(Footprints { found, cones, points: padded(count) });
     }
 
     /// Computes the curvature of the surface within the cones, and the width of highlights, unless that is done when points are
@@ -142,13 +142,13 @@ impl ShadingBatch {
     }
 }
 
-struct Print<'a> {
+struct Footprints<'a> {
     found: &'a Found,
     cones: &'a mut Cones,
     points: usize,
 }
 
-impl Kernel for Print<'_> {
+impl Kernel for Footprints<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -164,7 +164,7 @@ impl Kernel for Print<'_> {
 }
 
 struct Bend<'a> {
-    given: &'a Given,
+    given: &'a HitData,
     found: &'a Found,
     cones: &'a mut Cones,
     points: usize,

@@ -58,7 +58,7 @@ impl ShadingBatch {
         let (bsdf, has_inside) = (&constants.bsdf, constants.has_inside());
         let (found, painted, to, points) = (&self.found, &self.painted, &mut self.surroundings, padded(self.count));
         let overlays = self.overlays.as_deref_mut().filter(|over| over.any());
-        self.level.run(Look { found, painted, overlays, to, points, bsdf, has_inside, sky, ambient });
+        self.level.run(ReflectEnvironment { found, painted, overlays, to, points, bsdf, has_inside, sky, ambient });
         if let Some(weights) = &self.weights {
             self.level.run(Weigh { weights, radiance: &mut self.surroundings.radiance, points });
         }
@@ -91,7 +91,7 @@ impl Kernel for Weigh<'_> {
     }
 }
 
-struct Look<'a> {
+struct ReflectEnvironment<'a> {
     found: &'a Found,
     painted: &'a Painted,
     overlays: Option<&'a mut Overlays>,
@@ -103,7 +103,7 @@ struct Look<'a> {
     ambient: Vec3,
 }
 
-impl Kernel for Look<'_> {
+impl Kernel for ReflectEnvironment<'_> {
     type Output = ();
 
     // Whether maps change the material is tested outside the loops, which are then branch-free.

@@ -1,7 +1,7 @@
 //! Maps of a material and vertex colours that are read side by side for the points of a batch.
 
 use super::PlacedMesh;
-use super::columns::{Column, Columns, Found, Given, LANES, POINTS, ShadingBatch, get, padded, put};
+use super::columns::{Column, Columns, Found, HitData, LANES, POINTS, ShadingBatch, get, padded, put};
 use super::cones::Cones;
 use super::constants::{other_maps, reads_reflectance};
 use super::painted::Painted;
@@ -84,7 +84,7 @@ struct Map {
 
 /// Use of a texel.
 #[derive(Clone, Copy)]
-enum For {
+enum TexelUse {
     Slot(Slot),
     Lobe(usize),
 }
@@ -111,7 +111,7 @@ impl MaterialMaps {
                 }
             }
             let layout = Layout::of(store, map.texture)?;
-            material_maps.groups[group].add(layout, For::Slot(slot), map.texture, space);
+            material_maps.groups[group].add(layout, TexelUse::Slot(slot), map.texture, space);
             if let Slot::Normal = slot {
                 material_maps.normal_map = Some((map.texture, layout));
             }
@@ -125,7 +125,7 @@ impl MaterialMaps {
         for (map, space) in lobe_maps(m) {
             let layout = Layout::of(store, map.texture)?;
             let group = self.group(map)?;
-            self.groups[group].add(layout, For::Lobe(self.lobes.len()), map.texture, space);
+            self.groups[group].add(layout, TexelUse::Lobe(self.lobes.len()), map.texture, space);
             self.lobes.push((*map, space));
         }
         Some(self)
@@ -220,7 +220,7 @@ impl Group {
         }
     }
 
-    fn add(&mut self, layout: Layout, what: For, texture: u32, space: ColorSpace) {
+    fn add(&mut self, layout: Layout, what: TexelUse, texture: u32, space: ColorSpace) {
         let known = self.stacks.iter().position(|stack| stack.layout == layout).unwrap_or_else(|| {
             self.stacks.push(Stack { layout, maps: Vec::new() });
             self.stacks.len() - 1
@@ -231,8 +231,8 @@ impl Group {
             maps.len() - 1
         });
         match what {
-            For::Slot(slot) => maps[known].slots.push(slot),
-            For::Lobe(lobe) => maps[known].lobes.push(lobe),
+            TexelUse::Slot(slot) => maps[known].slots.push(slot),
+            TexelUse::Lobe(lobe) => maps[known].lobes.push(lobe),
         }
     }
 }
@@ -327,7 +327,7 @@ struct Read<'a> {
     material_maps: &'a MaterialMaps,
     material: &'a Material,
     store: &'a TextureStore<'a>,
-    given: &'a Given,
+    given: &'a HitData,
     front: &'a [u32; POINTS],
     /// Whether maps of lobes count only where fronts are seen.
     outside_alone: bool,
@@ -398,7 +398,7 @@ impl Kernel for Read<'_> {
 #[inline(always)]
 fn spread(
     spots: &mut Spots,
-    given: &Given,
+    given: &HitData,
     cones: &Cones,
     start: usize,
     offset: Vec2,
@@ -441,7 +441,7 @@ fn inputs(painted: &mut Painted, i: usize, material: &Material, vertex: Vec4, te
 
 /// Kernel that turns normals by the texels of a normal map.
 struct TurnNormals<'a> {
-    given: &'a Given,
+    given: &'a HitData,
     found: &'a mut Found,
     painted: &'a Painted,
     points: usize,

@@ -10,7 +10,7 @@ use crate::scene::UpAxis;
 const RAYS: usize = 32;
 
 /// Directions of rays, of any length, and the radiance along them.
-struct Looks {
+struct RayBatch {
     count: usize,
     /// Index of each ray.
     rays: [u32; RAYS],
@@ -23,7 +23,7 @@ impl Sky {
     /// Passes the radiance along each direction to `tell`, with the ray's number, as [`Self::radiance`] has it; cones are given
     /// as radians across. The order is not that of the rays.
     pub(crate) fn each_radiance(&self, rays: impl Iterator<Item = (u32, Vec3, f32)>, mut tell: impl FnMut(u32, Vec3)) {
-        let (mut looks, studio) = (Looks::NONE, self.studio());
+        let (mut looks, studio) = (RayBatch::NONE, self.studio());
         for (ray, dir, angle) in rays {
             match studio {
                 Some(up) if angle <= WIDE => {
@@ -48,7 +48,7 @@ impl Sky {
             let behind = |i: u32| self.behind(dir(i).try_normalize().unwrap_or(Vec3::Z), angles[i as usize]);
             return rays.iter().for_each(|&i| tell(i, behind(i)));
         };
-        let mut looks = Looks::NONE;
+        let mut looks = RayBatch::NONE;
         for some in rays.chunks(RAYS) {
             // Where no surface is near, their numbers are consecutive.
             let run = match some {
@@ -65,7 +65,7 @@ impl Sky {
     }
 }
 
-impl Looks {
+impl RayBatch {
     /// No rays.
     const NONE: Self = Self { count: 0, rays: [0; RAYS], dir: [[0.0; RAYS]; 3], radiance: [0.0; RAYS] };
 
@@ -87,7 +87,7 @@ impl Looks {
 
     /// Passes the radiance of each ray to `tell`, and empties the batch: the background (`BEHIND`), or the whole room.
     fn tell<const BEHIND: bool>(&mut self, up: UpAxis, tell: &mut impl FnMut(u32, Vec3)) {
-        Level::best().run(Look::<BEHIND> { looks: self, up });
+        Level::best().run(LookUpRays::<BEHIND> { looks: self, up });
         for i in 0..self.count.min(RAYS) {
             tell(self.rays[i], Vec3::splat(self.radiance[i]));
         }
@@ -95,12 +95,12 @@ impl Looks {
     }
 }
 
-struct Look<'a, const BEHIND: bool> {
-    looks: &'a mut Looks,
+struct LookUpRays<'a, const BEHIND: bool> {
+    looks: &'a mut RayBatch,
     up: UpAxis,
 }
 
-impl<const BEHIND: bool> Kernel for Look<'_, BEHIND> {
+impl<const BEHIND: bool> Kernel for LookUpRays<'_, BEHIND> {
     type Output = ();
 
     // The up axis is matched outside the loop, which is then branch-free.
@@ -114,7 +114,7 @@ impl<const BEHIND: bool> Kernel for Look<'_, BEHIND> {
 }
 
 #[inline(always)]
-fn look<const BEHIND: bool>(looks: &mut Looks, up: UpAxis) {
+fn look<const BEHIND: bool>(looks: &mut RayBatch, up: UpAxis) {
     for i in 0..RAYS {
         let dir = Vec3::new(looks.dir[0][i], looks.dir[1][i], looks.dir[2][i]);
         let dir = dir.try_normalize().unwrap_or(Vec3::Z);

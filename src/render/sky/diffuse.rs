@@ -59,7 +59,7 @@ fn cells(sky: &Pyramid) -> Vec<Cell> {
         (0..fine.width).map(|x| libm::sincosf((part(x, fine.width) - 0.5) * 2.0 * PI)).collect();
     let places: Vec<(u32, u32)> = (0..CELLS.1).flat_map(|row| (0..CELLS.0).map(move |column| (row, column))).collect();
     let cell = |(row, column): (u32, u32)| {
-        let mut look = Look { sky, angle: fine.angle(), lookups: Lookups::NONE, areas: [[0.0; LOOKUPS]; 3] };
+        let mut look = LookUpCell { sky, angle: fine.angle(), lookups: Lookups::NONE, areas: [[0.0; LOOKUPS]; 3] };
         for j in 0..FINER {
             let y = row * FINER + j;
             let (sin_down, cos_down) = libm::sincosf(part(y, fine.height) * PI);
@@ -78,7 +78,7 @@ fn cells(sky: &Pyramid) -> Vec<Cell> {
 }
 
 /// Looks up all places of a cell.
-struct Look<'a> {
+struct LookUpCell<'a> {
     sky: &'a Pyramid,
     /// Angle across a place, radians.
     angle: f32,
@@ -87,7 +87,7 @@ struct Look<'a> {
     areas: [Row; 3],
 }
 
-impl Kernel for Look<'_> {
+impl Kernel for LookUpCell<'_> {
     type Output = Cell;
 
     #[inline(always)]

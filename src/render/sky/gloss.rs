@@ -49,7 +49,7 @@ impl Turn {
 }
 
 /// Looks up the directions in which microfacets of `lobe` mirror `view`.
-struct Look<'a, F> {
+struct LookUpLobe<'a, F> {
     sky: &'a Pyramid,
     lobe: &'a Lobe,
     view: Vec3,
@@ -57,7 +57,7 @@ struct Look<'a, F> {
     to_map: F,
 }
 
-impl<F: Fn(Vec3) -> Vec3> Kernel for Look<'_, F> {
+impl<F: Fn(Vec3) -> Vec3> Kernel for LookUpLobe<'_, F> {
     type Output = Option<Vec3>;
 
     // The lanes are plain arrays: the token `S` only tells which instructions the compiler may use.
@@ -108,7 +108,7 @@ impl Pyramid {
         if lobe.angle(1) < self.finest() {
             return None;
         }
-        Level::best().run(Look { sky: self, lobe, view, turn: Turn::of(lobe, view), to_map })
+        Level::best().run(LookUpLobe { sky: self, lobe, view, turn: Turn::of(lobe, view), to_map })
     }
 }
 

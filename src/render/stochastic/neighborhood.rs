@@ -8,7 +8,7 @@
 use super::first_samples::FirstSamples;
 use super::pixel::Pixel;
 use super::variances::Variances;
-use crate::render::certainty::{Certainty, Even, GROUPS, Range, Seen, Shown};
+use crate::render::certainty::{Certainty, Even, GROUPS, PixelSummary, Range, Shown};
 use crate::render::tile::{Convergence, PixelFacts, Tile};
 
 /// Distance in columns and rows within which pixels are reopened: around a pixel on an edge, and around one with a thin detail,
@@ -27,7 +27,7 @@ pub(super) struct Neighborhood {
     /// Indices of the pixels that have more samples, or none yet, at the same places.
     numbers: Vec<u32>,
     /// What those pixels show, by index.
-    seen: Vec<Seen>,
+    seen: Vec<PixelSummary>,
     /// Variance of the samples, by place; 0 for a single sample that looks like all its neighbours.
     variances: Variances,
 }
@@ -70,7 +70,7 @@ impl Neighborhood {
     }
 
     /// What is seen at a place and its neighbours.
-    fn near(&self, at: usize) -> impl Iterator<Item = Seen> + Clone {
+    fn near(&self, at: usize) -> impl Iterator<Item = PixelSummary> + Clone {
         let rows = [at - self.columns(), at, at + self.columns()];
         let places = rows.into_iter().flat_map(|middle| middle - 1..middle + 2);
         places.map(|at| self.seen.get(self.numbers[at] as usize).copied().unwrap_or_else(|| self.shown.at(at)))
@@ -205,7 +205,8 @@ impl Neighborhood {
         for &i in some {
             let (own, pixel) = (&self.seen[i], &mut pixels[i]);
             let (near, samples) = (self.near(self.at(pixel.at)), pixel.facts.count);
-            let is_calm = |seen: Seen| judge.agree(&seen.range) && !judge.differ(own.color, seen.color, samples);
+            let is_calm =
+                |seen: PixelSummary| judge.agree(&seen.range) && !judge.differ(own.color, seen.color, samples);
             if samples < GROUPS as u32 && pixel.firefly == 0.0 && near.clone().all(is_calm) {
                 pixel.converge(own.error);
             } else {

@@ -59,7 +59,7 @@ const UNSAID: [f32; 4] = [f32::NAN, f32::NAN, f32::NAN, f32::NEG_INFINITY];
 
 /// Attributes of a face besides its corners.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::load) struct Said<'a> {
+pub(in crate::load) struct FaceAttributes<'a> {
     /// Texture coordinates of its corners, v upwards; empty, or one per corner.
     pub uvs: &'a [[f64; 2]],
     /// Colour, encoded as those of vertices.
@@ -124,7 +124,7 @@ impl PlainMesh {
 
     /// Adds a face, or counts one with too few corners.
     #[expect(clippy::cast_possible_truncation, reason = "memory for 2^32 corners was not granted")]
-    pub(in crate::load) fn face(&mut self, corners: &[u32], said: &Said) {
+    pub(in crate::load) fn face(&mut self, corners: &[u32], said: &FaceAttributes) {
         if corners.len() < 3 {
             self.few_corners += 1;
             return;

@@ -2,7 +2,7 @@
 
 use super::boxes::{Plain, survives, textured, triangles};
 use super::*;
-use crate::load::gltf::draco_codec::{Output, Wanted, decode};
+use crate::load::gltf::draco_codec::{Output, WantedAttribute, decode};
 use gltf::json::accessor::ComponentType;
 
 const NAME: &str = "KHR_draco_mesh_compression";
@@ -87,7 +87,7 @@ fn a_compressed_box_is_the_same_as_the_plain_one() {
 #[test]
 fn whole_numbers_and_the_order_of_vertices_are_kept() {
     let plain = Plain::new();
-    let wanted = |id, component, width| Wanted { id, name: String::new(), component, width, most: 24 };
+    let wanted = |id, component, width| WantedAttribute { id, name: String::new(), component, width, most: 24 };
     let all = [wanted(9, ComponentType::U8, 4), wanted(10, ComponentType::U8, 4), wanted(9, ComponentType::U16, 4)];
     let output = decode(&stream(ROW), &all).unwrap();
     assert_eq!(output.attributes[0], plain.joints.as_flattened());
@@ -209,7 +209,7 @@ fn what_the_decoder_does_not_know_is_one_line() {
 
 #[test]
 fn what_cannot_be_decoded_yet_tells_which_level_of_compression_can() {
-    let colors = Wanted { id: 0, name: String::new(), component: ComponentType::U8, width: 3, most: 290 };
+    let colors = WantedAttribute { id: 0, name: String::new(), component: ComponentType::U8, width: 3, most: 290 };
     let told = decode(&stream(SLOW), &[colors]).err().unwrap();
     assert!(told.contains("at levels 9 and 10 but not at 8"), "{told}");
 }
@@ -287,8 +287,8 @@ fn vertices_are_numbered_as_by_the_encoder_of_the_format() {
         2, 5, 6, 3, 11, 8, 8, 11, 12, 14, 9, 16, 10, 4, 15, 4, 0, 15, 17, 1, 19, 2, 6, 18, 20, 7, 21, 7, 13, 21, 14,
         16, 23, 19, 22, 17,
     ];
-    let joints = Wanted { id: 9, name: String::new(), component: ComponentType::U8, width: 4, most: 24 };
-    let colors = Wanted { id: 10, ..joints.clone() };
+    let joints = WantedAttribute { id: 9, name: String::new(), component: ComponentType::U8, width: 4, most: 24 };
+    let colors = WantedAttribute { id: 10, ..joints.clone() };
     let Output { attributes, indices, .. } = decode(&stream(WALK), &[joints.clone(), colors, joints]).unwrap();
     let vertices = attributes[0].as_chunks::<4>().0.iter().map(|[a, b, c, _]| format!("{a}{b}{c}"));
     assert_eq!(vertices.collect::<Vec<_>>().join(" "), VERTICES);
@@ -313,7 +313,7 @@ fn seams_that_end_at_one_vertex_leave_it_whole() {
         [0.0, -1.0],
     ];
     const INDICES: [u16; 24] = [0, 1, 3, 4, 2, 5, 2, 1, 5, 5, 1, 6, 6, 1, 8, 9, 7, 10, 7, 1, 10, 1, 0, 10];
-    let positions = Wanted { id: 2, name: String::new(), component: ComponentType::F32, width: 3, most: 11 };
+    let positions = WantedAttribute { id: 2, name: String::new(), component: ComponentType::F32, width: 3, most: 11 };
     let Output { attributes, indices, .. } = decode(&stream(SEAMS), &[positions]).unwrap();
     let floats: Vec<f32> = attributes[0].as_chunks::<4>().0.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
     assert!(floats.as_chunks::<3>().0.iter().map(|&[x, y, _]| [x.round(), y.round()]).eq(PLACES));

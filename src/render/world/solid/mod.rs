@@ -29,7 +29,7 @@ pub(super) enum Solid {
 
 /// Opaque faces of each mesh of a scene; where textures are missing, none counts as opaque.
 pub(super) fn solids(scene: &Scene) -> Vec<Solid> {
-    let mut known = Known { scene, extremes: HashMap::new(), blocks: HashMap::new() };
+    let mut known = BlockTables { scene, extremes: HashMap::new(), blocks: HashMap::new() };
     let mut layers: Vec<Option<Option<Vec<Layer>>>> = scene.materials.iter().map(|_| None).collect();
     let of = |mesh: &Mesh| {
         let number = mesh.material as usize;
@@ -51,7 +51,7 @@ struct Layer {
 }
 
 /// Cache of block tables of bitmaps: materials often share them.
-struct Known<'a> {
+struct BlockTables<'a> {
     scene: &'a Scene,
     /// By bitmap and channel.
     extremes: HashMap<(u32, usize), Option<Extremes>>,
@@ -59,7 +59,7 @@ struct Known<'a> {
     blocks: HashMap<(u32, usize, [u32; 2]), Option<Arc<Blocks>>>,
 }
 
-impl Known<'_> {
+impl BlockTables<'_> {
     /// Maps of a material whose faces are opaque where all these maps are solid and vertex colours are too; `None` where no face
     /// is opaque, or where that is unknown.
     fn layers(&mut self, material: &Material) -> Option<Vec<Layer>> {
