@@ -230,20 +230,20 @@ impl<'a> AnyAccel<'a> {
                 IntersectorKind::MollerTrumbore => question.ask(&Tested::new(a, MollerTrumbore), scratch),
                 IntersectorKind::MollerTrumboreDouble => question.ask(&Tested::new(a, MollerTrumboreDouble), scratch),
             }),
-            Structure::Wide(a) => looked(a, self.test, question, scratch),
+            Structure::Wide(a) => run_by_kind(a, self.test, question, scratch),
             Structure::TwoLevel(a) => with_scratch(a, scratch, |scratch| question.ask(a, scratch)),
-            Structure::None(a) => looked(a, self.test, question, scratch),
-            Structure::Transform(a) => looked(a, self.test, question, scratch),
-            Structure::Spheres(a) => looked(a, self.test, question, scratch),
-            Structure::Boxes(a) => looked(a, self.test, question, scratch),
-            Structure::Bvh(a) => looked(a, self.test, question, scratch),
-            Structure::Grid(a) => looked(a, self.test, question, scratch),
+            Structure::None(a) => run_by_kind(a, self.test, question, scratch),
+            Structure::Transform(a) => run_by_kind(a, self.test, question, scratch),
+            Structure::Spheres(a) => run_by_kind(a, self.test, question, scratch),
+            Structure::Boxes(a) => run_by_kind(a, self.test, question, scratch),
+            Structure::Bvh(a) => run_by_kind(a, self.test, question, scratch),
+            Structure::Grid(a) => run_by_kind(a, self.test, question, scratch),
         }
     }
 }
 
 /// Runs a query with the test looked up at each use, unless it is the exact one.
-fn looked<C: Culling<Scratch: 'static>>(
+fn run_by_kind<C: Culling<Scratch: 'static>>(
     accel: &C,
     test: IntersectorKind,
     question: impl Question,

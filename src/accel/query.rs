@@ -51,13 +51,13 @@ pub trait Goal {
 
     /// Whether hits with non-opaque prims can count at all.
     #[inline(always)]
-    fn wants_open(&self) -> bool {
+    fn wants_transparent(&self) -> bool {
         true
     }
 
     /// Whether a hit with `prim` within the ray's range counts.
     #[inline(always)]
-    fn minds(&self, _opaque: bool, _prim: u32) -> bool {
+    fn counts_hit(&self, _opaque: bool, _prim: u32) -> bool {
         true
     }
 
@@ -134,7 +134,7 @@ impl<'a, G: Goal> Query<'a, G> {
     /// Whether a prim is tested at all: false for the prim that the ray excludes, and for prims whose hits cannot count.
     #[inline]
     pub fn asks_for(&self, prim: u32) -> bool {
-        prim != self.exclude && (self.goal.wants_open() || self.is_opaque(prim))
+        prim != self.exclude && (self.goal.wants_transparent() || self.is_opaque(prim))
     }
 
     /// Tests every bounded prim, until the query is answered.
@@ -178,7 +178,7 @@ impl<'a, G: Goal> Query<'a, G> {
     #[inline]
     fn offer(&mut self, t: f32, prim: u32) -> Outcome {
         if t >= self.t_min && t <= self.t_max {
-            if G::ANY && !self.goal.minds(self.is_opaque(prim), prim) || !G::ANY && self.passes(t, prim) {
+            if G::ANY && !self.goal.counts_hit(self.is_opaque(prim), prim) || !G::ANY && self.passes(t, prim) {
                 return Outcome::LetThrough;
             }
             self.goal.offer(t, prim)
@@ -213,7 +213,7 @@ impl<'a, G: Goal> Query<'a, G> {
         verdicts: Verdicts,
         probe: &mut P,
     ) -> bool {
-        self.decide_open(prims, count, verdicts, probe, |query, lane, certain, probe| {
+        self.decide_transparent(prims, count, verdicts, probe, |query, lane, certain, probe| {
             query.take(prims[lane], &corners_of(corners, lane), certain, probe)
         })
     }
@@ -228,7 +228,7 @@ impl<'a, G: Goal> Query<'a, G> {
         verdicts: Verdicts,
         probe: &mut P,
     ) -> bool {
-        self.decide_open(prims, count, verdicts, probe, |query, lane, certain, probe| {
+        self.decide_transparent(prims, count, verdicts, probe, |query, lane, certain, probe| {
             let prim = prims[lane];
             if prim == query.exclude {
                 probe.tested(|| Test { prim, t: f32::NAN, outcome: Outcome::LeftOut });
@@ -240,7 +240,7 @@ impl<'a, G: Goal> Query<'a, G> {
 
     /// Calls `take` for each lane that is not a certain miss, with a flag for certain hits, until the query is answered.
     #[inline(always)]
-    fn decide_open<P: Probe>(
+    fn decide_transparent<P: Probe>(
         &mut self,
         prims: &[u32; LANES],
         count: u32,
@@ -389,11 +389,11 @@ impl<I: Intersector> Goal for Occluded<'_, I> {
     const ANY: bool = true;
 
     #[inline]
-    fn wants_open(&self) -> bool {
+    fn wants_transparent(&self) -> bool {
         self.filter.is_some()
     }
     #[inline(always)]
-    fn minds(&self, opaque: bool, prim: u32) -> bool {
+    fn counts_hit(&self, opaque: bool, prim: u32) -> bool {
         opaque || self.filter.is_some_and(|filter| filter.stops(self.ray, prim))
     }
     #[inline]

@@ -50,7 +50,7 @@ impl FanReady {
 }
 
 /// Edge values of the rays.
-pub struct FanLook<S: Lanewise<N>, const N: usize>([S::Lanes; 3]);
+pub struct FanTest<S: Lanewise<N>, const N: usize>([S::Lanes; 3]);
 
 impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
     /// Prepares rays from `origin`, with directions by axis and lane, whose largest components are along axis `z`, and the
@@ -125,7 +125,7 @@ impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
 
 impl<S: Lanewise<N>, const N: usize> Rows<S, N> for Fan<S, N> {
     type Ready = FanReady;
-    type BlockTest = FanLook<S, N>;
+    type BlockTest = FanTest<S, N>;
 
     #[inline(always)]
     fn ready<T: Simd>(&self, s: T, corners: &Corners8) -> FanReady {
@@ -133,7 +133,7 @@ impl<S: Lanewise<N>, const N: usize> Rows<S, N> for Fan<S, N> {
     }
 
     #[inline(always)]
-    fn look(&self, s: S, ready: &FanReady, lane: usize) -> (Verdicts, FanLook<S, N>) {
+    fn test(&self, s: S, ready: &FanReady, lane: usize) -> (Verdicts, FanTest<S, N>) {
         let u = self.value(s, &ready.edges[0], lane);
         let v = self.value(s, &ready.edges[1], lane);
         let w = self.value(s, &ready.edges[2], lane);
@@ -141,11 +141,11 @@ impl<S: Lanewise<N>, const N: usize> Rows<S, N> for Fan<S, N> {
         let error = ready.error[lane % LANES];
         let (hit, miss) = (s.less(s.splat(error), low), s.less(low, s.splat(-error)));
         let unsure = !(hit | miss) & (u32::MAX >> (u32::BITS as usize - N));
-        (Verdicts { hit, unsure }, FanLook([u, v, w]))
+        (Verdicts { hit, unsure }, FanTest([u, v, w]))
     }
 
     #[inline(always)]
-    fn distances(&self, s: S, ready: &FanReady, lane: usize, FanLook([u, v, w]): &FanLook<S, N>) -> [S::Lanes; 2] {
+    fn distances(&self, s: S, ready: &FanReady, lane: usize, FanTest([u, v, w]): &FanTest<S, N>) -> [S::Lanes; 2] {
         let [a, b, c] = &ready.heights;
         let (a, b, c) = (s.splat(a[lane % LANES]), s.splat(b[lane % LANES]), s.splat(c[lane % LANES]));
         let whole = s.mul(s.div(s.splat(1.0), s.add(*u, s.add(*v, *w))), self.per_length);
@@ -233,8 +233,8 @@ mod tests {
             let ready = fan.ready_within(s, &corners, margin);
             let mut said = [(Verdicts { hit: 0, unsure: 0 }, [[0.0; LANES]; 2]); LANES];
             for (lane, said) in said.iter_mut().enumerate() {
-                let (verdicts, look) = fan.look(s, &ready, lane);
-                let [low, high] = fan.distances(s, &ready, lane, &look);
+                let (verdicts, test) = fan.test(s, &ready, lane);
+                let [low, high] = fan.distances(s, &ready, lane, &test);
                 *said = (verdicts, [s.store(low), s.store(high)]);
             }
             said

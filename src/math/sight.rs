@@ -40,7 +40,7 @@ pub struct BlockTest<S: Simd> {
 impl Sight {
     /// Tests eight triangles.
     #[inline(always)]
-    pub fn look<S: Simd>(&self, s: S, corners: &Corners8) -> BlockTest<S> {
+    pub fn test<S: Simd>(&self, s: S, corners: &Corners8) -> BlockTest<S> {
         let [ox, oy, oz] = [s.splat(self.origin[0]), s.splat(self.origin[1]), s.splat(self.origin[2])];
         let [p, q] = [s.splat(self.shear[0]), s.splat(self.shear[1])];
         let [x, y, z] = AXES[self.main as usize % 4];
@@ -90,10 +90,10 @@ pub trait Rows<S: Lanewise<N>, const N: usize> {
     fn ready<T: Simd>(&self, s: T, corners: &Corners8) -> Self::Ready;
 
     /// Tests one of eight prepared triangles, with a bit per ray. A hit behind the origin may be reported as a miss.
-    fn look(&self, s: S, ready: &Self::Ready, lane: usize) -> (Verdicts, Self::BlockTest);
+    fn test(&self, s: S, ready: &Self::Ready, lane: usize) -> (Verdicts, Self::BlockTest);
 
     /// Bounds of the exact distances of the rays that hit for certain.
-    fn distances(&self, s: S, ready: &Self::Ready, lane: usize, look: &Self::BlockTest) -> [S::Lanes; 2];
+    fn distances(&self, s: S, ready: &Self::Ready, lane: usize, test: &Self::BlockTest) -> [S::Lanes; 2];
 }
 
 impl<S: Lanewise<N>, const N: usize> RowSight<S, N> {
@@ -141,7 +141,7 @@ impl<S: Lanewise<N>, const N: usize> Rows<S, N> for RowSight<S, N> {
     }
 
     #[inline(always)]
-    fn look(&self, s: S, [a, b, c]: &Corners8, lane: usize) -> (Verdicts, View<S, N>) {
+    fn test(&self, s: S, [a, b, c]: &Corners8, lane: usize) -> (Verdicts, View<S, N>) {
         let (a, b, c) = (self.relative(s, a, lane), self.relative(s, b, lane), self.relative(s, c, lane));
         let sheared = [self.sheared(s, a), self.sheared(s, b), self.sheared(s, c)];
         view(s, sheared, [a[2], b[2], c[2]])
@@ -233,9 +233,9 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self, s: S) -> Self::Output {
             let Self(sight, corners, margins) = self;
-            let look = sight.look(s, corners);
-            let [low, high] = look.view.distances(s, s.splat(sight.per_length), margins);
-            (look.verdicts, [s.store(low), s.store(high)])
+            let test = sight.test(s, corners);
+            let [low, high] = test.view.distances(s, s.splat(sight.per_length), margins);
+            (test.verdicts, [s.store(low), s.store(high)])
         }
     }
 

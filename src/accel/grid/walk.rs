@@ -125,7 +125,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
             let (axis, leave) = first_exit(exits);
             let entry = self.top[self.lattice.top_index(cell)];
             if entry & NODE == 0 {
-                probe.visit(|| self.told(NodeId::Cell(cell), self.lattice.top_cube(cell), Some(entry)));
+                probe.visit(|| self.visit_record(NodeId::Cell(cell), self.lattice.top_cube(cell), Some(entry)));
             }
             if entry == EMPTY {
                 probe.step();
@@ -182,7 +182,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
             let (cell, level) = self.descend(root, at, probe);
             probe.visit(|| {
                 let cube = Cube { lo: at.map(|c| c >> level << level), level };
-                self.told(NodeId::Octant(cube.lo, level), cube, Some(cell))
+                self.visit_record(NodeId::Octant(cube.lo, level), cube, Some(cell))
             });
             if cell == EMPTY {
                 probe.step();
@@ -234,7 +234,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
             probe.step();
             probe.visit(|| {
                 let cube = Cube { lo: at.map(|c| c >> level << level), level };
-                self.told(NodeId::OctreeNode(cube.lo, level), cube, None)
+                self.visit_record(NodeId::OctreeNode(cube.lo, level), cube, None)
             });
             level -= 1;
             let octant = (at[0] >> level & 1) | (at[1] >> level & 1) << 1 | (at[2] >> level & 1) << 2;
@@ -244,7 +244,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
     }
 
     /// Record of a visit to a node, or to a cell with its list; a hierarchy in the cell records its own.
-    fn told(&self, place: NodeId, cube: Cube, cell: Option<u32>) -> Visit {
+    fn visit_record(&self, place: NodeId, cube: Cube, cell: Option<u32>) -> Visit {
         let listed =
             cell.filter(|&cell| self.trees.root(cell).is_none()).map(|cell| self.cells.list(cell).len() as u32);
         Visit { place, extent: Extent::Box(self.lattice.bounds(cube)), listed }

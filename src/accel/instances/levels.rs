@@ -128,7 +128,7 @@ impl<'a> TwoLevel<'a> {
                 let opaque = self.instanced.objects()[placed.object as usize].opaque;
                 let tree = &self.objects[placed.object as usize];
                 query.opaque = Some(opaque);
-                (opaque || query.goal.wants_open())
+                (opaque || query.goal.wants_transparent())
                     && tree.walk_placed(&placed.place, placed.first, query, stack, probe)
             })
         });

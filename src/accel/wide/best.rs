@@ -129,11 +129,11 @@ impl Seeker {
     ) -> bool {
         let (index, count) = Child::block(leaf);
         let Some(block) = tree.blocks.get(index as usize) else { return true };
-        let look = sight.look(s, &block.corners);
-        if (look.verdicts.hit | look.verdicts.unsure) & lanes(count) == 0 {
+        let test = sight.test(s, &block.corners);
+        if (test.verdicts.hit | test.verdicts.unsure) & lanes(count) == 0 {
             return false;
         }
-        let met = self.met(s, sight, &look, count);
+        let met = self.met(s, sight, &test, count);
         met.open != 0 && self.take::<B, _>(tree, shapes, batch, index, &met)
     }
 
@@ -141,14 +141,14 @@ impl Seeker {
     #[inline(always)]
     pub(super) fn meet<S: Simd>(&self, s: S, sight: &Sight, tree: &Tree, leaf: u32) -> BlockHits {
         let (index, count) = Child::block(leaf);
-        self.met(s, sight, &sight.look(s, &tree.blocks[index as usize].corners), count)
+        self.met(s, sight, &sight.test(s, &tree.blocks[index as usize].corners), count)
     }
 
     #[inline(always)]
-    fn met<S: Simd>(&self, s: S, sight: &Sight, look: &BlockTest<S>, count: u32) -> BlockHits {
-        let [low, high] = look.distances(s, sight);
+    fn met<S: Simd>(&self, s: S, sight: &Sight, test: &BlockTest<S>, count: u32) -> BlockHits {
+        let [low, high] = test.distances(s, sight);
         let in_time = s.at_most(low, s.splat(self.best.high)) & s.at_most(s.splat(self.t_min), high);
-        let (hit, unsure) = (look.verdicts.hit & in_time & lanes(count), look.verdicts.unsure & lanes(count));
+        let (hit, unsure) = (test.verdicts.hit & in_time & lanes(count), test.verdicts.unsure & lanes(count));
         BlockHits { low: s.store(low), high: s.store(high), hit, open: hit | unsure }
     }
 
@@ -193,7 +193,8 @@ impl Seeker {
         match between {
             Some((low, high)) if low > self.best.high || high < self.t_min => false,
             Some((low, high)) if (low > self.t_min) & (high < self.best.low) & (high <= self.best.high) => {
-                if W::Goal::ANY && !batch.goal(self.number).minds(shapes.opaque.get_or_set(place.prim), place.prim) {
+                if W::Goal::ANY && !batch.goal(self.number).counts_hit(shapes.opaque.get_or_set(place.prim), place.prim)
+                {
                     return false;
                 }
                 if !W::Goal::ANY && batch.filter().is_some() && passes(shapes, batch, self.number, place.prim) {
@@ -239,8 +240,9 @@ pub(super) fn decide<W: QueryBatch>(
     }
     let t = triangle::distance_along(ray.origin, ray.dir, &corners);
     let (mut goal, within) = (batch.goal(i), batch.t_min(i)..=ray.t_max.min(f32::MAX));
-    let minds = |goal: &W::Goal| !W::Goal::ANY || goal.minds(shapes.opaque.get_or_set(place.prim), place.prim);
-    if !within.contains(&t) || !minds(&goal) || goal.offer(t, place.prim) != Outcome::Hit {
+    let counts_hit =
+        |goal: &W::Goal| !W::Goal::ANY || goal.counts_hit(shapes.opaque.get_or_set(place.prim), place.prim);
+    if !within.contains(&t) || !counts_hit(&goal) || goal.offer(t, place.prim) != Outcome::Hit {
         return None;
     }
     if W::Goal::ANY {

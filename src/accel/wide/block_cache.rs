@@ -51,7 +51,7 @@ impl BlockCache {
 
     /// Sets the viewpoint, and removes blocks prepared for another one.
     #[inline(always)]
-    pub(super) fn sit(&mut self, key: CacheKey) {
+    pub(super) fn set_viewpoint(&mut self, key: CacheKey) {
         if self.key != key {
             self.key = key;
             self.clear();

@@ -12,7 +12,7 @@ use super::node::{Child, Node, Tree};
 use super::pending_hits::PendingHits;
 use super::prepared::{PreparedRay, PreparedRays};
 use super::slabs::BoxMargins;
-use super::walk::{Entry, ask_by_itself};
+use super::walk::{Entry, trace_alone};
 use crate::accel::query_batch::QueryBatch;
 use crate::accel::{Hit, NO_PRIM, Shapes};
 use crate::math::simd::{Kernel, LANES, Order, Simd};
@@ -229,7 +229,7 @@ impl<W: QueryBatch, B: BoxMargins> Flight<'_, W, B> {
             }
             queue.next += 1;
             if queue.ready.allowed >> lane & 1 == 0 {
-                ask_by_itself::<B, _>(self.tree, self.shapes, self.batch, i, self.entries);
+                trace_alone::<B, _>(self.tree, self.shapes, self.batch, i, self.entries);
                 continue;
             }
             let (ray, root) = (&queue.ready.rays[lane], &self.tree.nodes[0]);

@@ -275,7 +275,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let (rays, per_length) = (&self.rays, self.rays.per_length());
         let sight = match rays.common {
             Some(from) => {
-                trace.cache.sit((from, rays.z, rays.octant));
+                trace.cache.set_viewpoint((from, rays.z, rays.octant));
                 Seen::Together(Fan::new(wide, from, &rays.dir, rays.z, per_length))
             }
             None => Seen::Apart(RowSight::new(wide, &rays.origin, &rays.dir, rays.z, per_length)),
@@ -415,10 +415,10 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         while lanes != 0 {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
-            let (verdicts, look) = sight.look(wide, ready, lane as usize);
+            let (verdicts, test) = sight.test(wide, ready, lane as usize);
             if (verdicts.hit | verdicts.unsure) & rays != 0 {
                 let place = TriangleSlot { block: index, lane, prim: block.prims[lane as usize % LANES] };
-                let between = sight.distances(wide, ready, lane as usize, &look);
+                let between = sight.distances(wide, ready, lane as usize, &test);
                 let hit = self.take(wide, trace, (place, rays), verdicts, between, reach);
                 changed |= hit;
                 if W::Goal::ANY {
@@ -444,7 +444,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let prim = place.prim;
         let rays = rays & !s.find_word(prim, &self.rays.exclude);
         let opaque = !W::Goal::ANY || trace.shapes.opaque.get_or_set(prim);
-        if !opaque && !trace.batch.goal(self.start).wants_open() {
+        if !opaque && !trace.batch.goal(self.start).wants_transparent() {
             return 0;
         }
         let (mut hit, unsure) = (verdicts.hit & rays, verdicts.unsure & rays);
@@ -498,7 +498,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     #[cold]
     #[inline(never)]
     fn minding<W: QueryBatch>(&self, batch: &W, prim: u32, rays: u32) -> u32 {
-        those(rays, |ray| batch.goal(self.start + ray).minds(false, prim))
+        those(rays, |ray| batch.goal(self.start + ray).counts_hit(false, prim))
     }
 
     /// Exact distances and barycentric coordinates of the hits of the rays in `left`.

@@ -7,7 +7,7 @@ use super::node::{Child, Node, Tree};
 use super::pending_hits::PendingHits;
 use super::prepared::{PreparedRay, PreparedRays};
 use super::slabs::BoxMargins;
-use super::walk::{Entry, ask_by_itself};
+use super::walk::{Entry, trace_alone};
 use crate::accel::Shapes;
 use crate::accel::query::Goal;
 use crate::accel::query_batch::QueryBatch;
@@ -62,7 +62,7 @@ impl SingleRays {
                 continue;
             }
             if self.ready.allowed >> lane & 1 == 0 {
-                ask_by_itself::<B, _>(tree, shapes, batch, i, stack);
+                trace_alone::<B, _>(tree, shapes, batch, i, stack);
                 continue;
             }
             let ray = &self.ready.rays[lane % LANES];

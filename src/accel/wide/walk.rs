@@ -64,14 +64,14 @@ impl<W: QueryBatch, P: Probe, B: BoxMargins> Kernel for OneByOne<'_, W, P, B> {
         let Self { tree, shapes, batch, stack: Stack { entries: stack, .. }, probe, .. } = self;
         let Some(root) = tree.nodes.first().filter(|_| shapes.planes.is_empty()) else {
             for i in 0..batch.rays().len() {
-                ask::<B, _, _, _>(s, tree, shapes, batch, i, stack, probe);
+                trace_one::<B, _, _, _>(s, tree, shapes, batch, i, stack, probe);
             }
             return;
         };
         for i in 0..batch.rays().len() {
             let ray = &batch.rays()[i];
             if !(B::allow(tree, ray.origin) && has_direction(ray.dir)) {
-                ask::<B, _, _, _>(s, tree, shapes, batch, i, stack, probe);
+                trace_one::<B, _, _, _>(s, tree, shapes, batch, i, stack, probe);
                 continue;
             }
             // Many rays meet no box at all, and need no more than this.
@@ -100,19 +100,19 @@ fn has_direction(dir: Vec3) -> bool {
 /// Traces a ray that cannot be tested against padded boxes. Such rays are rare: code for one instruction set suffices.
 #[cold]
 #[inline(never)]
-pub(super) fn ask_by_itself<B: BoxMargins, W: QueryBatch>(
+pub(super) fn trace_alone<B: BoxMargins, W: QueryBatch>(
     tree: &Tree,
     shapes: &Shapes,
     batch: &mut W,
     i: usize,
     stack: &mut [Entry],
 ) {
-    ask::<B, _, _, _>(Portable, tree, shapes, batch, i, stack, &mut NoProbe);
+    trace_one::<B, _, _, _>(Portable, tree, shapes, batch, i, stack, &mut NoProbe);
 }
 
 /// Traces a single ray through prims of any kind.
 #[inline(always)]
-fn ask<B: BoxMargins, S: Simd, W: QueryBatch, P: Probe>(
+fn trace_one<B: BoxMargins, S: Simd, W: QueryBatch, P: Probe>(
     s: S,
     tree: &Tree,
     shapes: &Shapes,

@@ -29,7 +29,7 @@ impl Kernel for Row8<'_> {
         set_corners(&mut corners, 3, triangle);
         let per_length = s.store(s.div(s.splat(1.0), s.load(&dir[rays[0].z])));
         let sight = RowSight::<S, LANES>::new(s, &origin, &dir, rays[0].z, &per_length);
-        let (verdicts, _) = sight.look(s, &sight.ready(s, &corners), 3);
+        let (verdicts, _) = sight.test(s, &sight.ready(s, &corners), 3);
         let plane = Plane::of(triangle);
         let (least, most) = (
             |f: fn(&RaySpace) -> DVec3| rays.iter().map(f).reduce(DVec3::min).unwrap(),
