@@ -26,7 +26,7 @@ pub(super) struct PictureId<'a> {
 }
 
 /// Formats the forecast of one picture, which itself takes `picture` bytes of memory.
-pub(super) fn told(
+pub(super) fn formatted(
     which: PictureId,
     work: &Job,
     forecast: &Forecast,

@@ -21,7 +21,7 @@ pub(super) fn warning(
     if job.world.is_empty() {
         return None;
     }
-    let warning = said(looked_through(job), choice, lens, job.scene, file)?;
+    let warning = explanation(looked_through(job), choice, lens, job.scene, file)?;
     Some(Diagnostic { text: format!("{view}: {}", warning.text), ..warning })
 }
 
@@ -49,7 +49,7 @@ pub(super) fn sequence(pictures: usize, file: &Path) -> Diagnostic {
         .remedy("aim the eye with --at, or name a --view, which frames the model")
 }
 
-fn said(
+fn explanation(
     Coverage { rays, hits, shown }: Coverage,
     choice: &Choice,
     lens: Option<LensChoice>,
@@ -92,7 +92,7 @@ mod tests {
 
     fn code(hits: usize, choice: &Choice) -> Option<&'static str> {
         let coverage = Coverage { rays: 40_960, hits, shown: hits > 0 };
-        said(coverage, choice, None, &Scene::default(), Path::new("a.glb")).map(|warning| warning.code)
+        explanation(coverage, choice, None, &Scene::default(), Path::new("a.glb")).map(|warning| warning.code)
     }
 
     #[test]

@@ -110,8 +110,8 @@ impl Messages {
         Self { format, quiet, ..Self::default() }
     }
 
-    /// Sink of the same kind whose messages are held back until [`Self::tell`] writes them.
-    pub(super) fn apart(&self) -> Self {
+    /// Sink of the same kind whose messages are held back until [`Self::write_held`] writes them.
+    pub(super) fn held_back(&self) -> Self {
         let kept = Kept::default();
         let mut all = APART.lock().unwrap_or_else(PoisonError::into_inner);
         all.retain(|apart| apart.strong_count() > 0);
@@ -125,7 +125,7 @@ impl Messages {
     }
 
     /// Writes the messages that `apart` holds back.
-    pub(super) fn tell(&self, apart: &Self) {
+    pub(super) fn write_held(&self, apart: &Self) {
         self.warnings.fetch_add(apart.warnings(), Ordering::Relaxed);
         if let Some(Ok(mut lines)) = apart.kept.as_ref().map(|kept| kept.lock())
             && !lines.is_empty()

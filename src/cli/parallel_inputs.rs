@@ -109,7 +109,7 @@ impl Sizes {
                 "nff" => self.has_size.then_some(own),
                 "gltf" | "obj" => {
                     let folder = input.parent()?;
-                    Some(own + (*self.beside.entry(folder.to_path_buf()).or_insert_with(|| beside(folder)))?)
+                    Some(own + (*self.beside.entry(folder.to_path_buf()).or_insert_with(|| companion_bytes(folder)))?)
                 }
                 _ => None,
             }
@@ -119,7 +119,7 @@ impl Sizes {
 }
 
 /// Bytes per model of other files in a folder and its direct subfolders; `None` with more than [`LOOKED_AT`] entries.
-fn beside(folder: &Path) -> Option<u64> {
+fn companion_bytes(folder: &Path) -> Option<u64> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let (mut bytes, mut models, mut looked_at, mut left) = (0, 0, 0, vec![(folder.to_path_buf(), true)]);
     while let Some((folder, is_own)) = left.pop() {
@@ -245,7 +245,7 @@ impl<'a, 's> Queue<'a, 's> {
         let number = state.next;
         let batch = *self.batches.get(number)?;
         state.next += 1;
-        let messages = self.messages.apart();
+        let messages = self.messages.held_back();
         let shots = render::writable_shots(self.job, batch, &messages, state.run_state);
         let own = state.run_state.of_one();
         Some((number, messages, shots, own))
@@ -265,7 +265,7 @@ impl<'a, 's> Queue<'a, 's> {
     }
 
     fn tell(&self, state: &mut State, Finished { messages, run_state, exit }: Finished) {
-        self.messages.tell(&messages);
+        self.messages.write_held(&messages);
         state.run_state.add(run_state);
         state.ended.and(exit);
     }

@@ -72,14 +72,14 @@ fn finite(text: &str) -> Result<f64, String> {
     text.trim().parse::<f64>().ok().filter(|n| n.is_finite()).ok_or_else(|| "write a number".into())
 }
 
-fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
+fn number_within(text: &str, low: f64, high: f64) -> Result<f64, String> {
     let n = finite(text)?;
     if (low..=high).contains(&n) { Ok(n) } else { Err(format!("write a number from {low} to {high}")) }
 }
 
 /// Parses a field of view in degrees.
 pub(super) fn fov(text: &str) -> Result<f64, String> {
-    within(text, 0.1, 170.0)
+    number_within(text, 0.1, 170.0)
 }
 
 /// Parses a time into seconds, with an optional unit: `1.5`, `1.5s`, `250ms`.
@@ -155,19 +155,19 @@ pub(super) fn turns(text: &str) -> Result<Turns, String> {
 #[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
 pub(super) fn exposure(text: &str) -> Result<f32, String> {
     let most = f64::from(MAX_STOPS);
-    within(text, -most, most).map(|n| n as f32)
+    number_within(text, -most, most).map(|n| n as f32)
 }
 
 /// Parses a weight from 0 to 1.
 #[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
 pub(super) fn cutoff(text: &str) -> Result<f32, String> {
-    within(text, 0.0, 1.0).map(|n| n as f32)
+    number_within(text, 0.0, 1.0).map(|n| n as f32)
 }
 
 /// Parses an error or a difference of channels.
 #[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
 pub(super) fn error(text: &str) -> Result<f32, String> {
-    within(text, 1e-6, 1e6).map(|n| n as f32)
+    number_within(text, 1e-6, 1e6).map(|n| n as f32)
 }
 
 /// Parses a probability, as a fraction or in percent.

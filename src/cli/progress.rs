@@ -87,7 +87,7 @@ impl<'a> Progress<'a> {
     }
 
     /// Reports that work of unknown length continues.
-    fn goes_on(&self, doing: &'static str) {
+    fn keep_alive(&self, doing: &'static str) {
         match &self.how {
             Display::Silent => {}
             Display::Bar { bar, .. } => {
@@ -154,7 +154,7 @@ impl crate::render::Progress for Progress<'_> {
     }
 
     fn plans(&self) {
-        self.goes_on("rendering parts to find out what it takes");
+        self.keep_alive("rendering parts to find out what it takes");
     }
 
     fn begins(&self) {

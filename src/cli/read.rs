@@ -22,7 +22,8 @@ pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded,
     let mut whole = one(first, &LoadOptions { animations_before: Some(0), ..options.clone() })?;
     let mut hashes = whole.facts.hash.to_le_bytes().to_vec();
     for input in others {
-        let (limits, animations_before) = (left(&options.limits, &whole), Some(whole.facts.animations.len()));
+        let (limits, animations_before) =
+            (remaining_limits(&options.limits, &whole), Some(whole.facts.animations.len()));
         let part = one(input, &LoadOptions { limits, animations_before, ..options.clone() })?;
         hashes.extend(part.facts.hash.to_le_bytes());
         append(&mut whole, part);
@@ -34,12 +35,12 @@ pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded,
 }
 
 /// Limits that remain beside a loaded model.
-pub(super) fn left(limits: &Limits, loaded: &Loaded) -> Limits {
-    beside(limits, loaded.facts.kept)
+pub(super) fn remaining_limits(limits: &Limits, loaded: &Loaded) -> Limits {
+    limits_beside(limits, loaded.facts.kept)
 }
 
 /// Limits that remain beside `bytes` bytes.
-pub(super) fn beside(limits: &Limits, bytes: u64) -> Limits {
+pub(super) fn limits_beside(limits: &Limits, bytes: u64) -> Limits {
     let memory = limits.memory.saturating_sub(bytes);
     Limits { memory, file: limits.file.min(memory), ..*limits }
 }

@@ -322,7 +322,7 @@ fn kind_of(warning: &Diagnostic) -> Kind {
 fn load(job: &RenderJob, batch: &Batch, options: LoadOptions) -> Result<Loaded, LoadError> {
     let (env, limits) = (&job.look.env_read, options.limits);
     let kept = env.kept();
-    match read::scene(&batch.inputs, &LoadOptions { limits: read::beside(&limits, kept), ..options.clone() }) {
+    match read::scene(&batch.inputs, &LoadOptions { limits: read::limits_beside(&limits, kept), ..options.clone() }) {
         Err(error) if kept > 0 && Exit::from(&error) == Exit::Failed => {
             env.forget();
             read::scene(&batch.inputs, &options)

@@ -10,7 +10,7 @@ use clap_complete::Shell;
 pub(super) fn completions(shell: Shell) -> Exit {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "meshray", &mut script);
-    show(&script)
+    print(&script)
 }
 
 /// Prints the manual page, followed by those of the commands.
@@ -24,9 +24,9 @@ pub(super) fn man() -> Exit {
         let name: &'static str = format!("meshray-{}", sub.get_name()).leak();
         rendered = rendered.and_then(|()| clap_mangen::Man::new(sub.clone().name(name)).render(&mut page));
     }
-    rendered.map_or_else(|why| Messages::default().unprintable(&why), |()| show(&page))
+    rendered.map_or_else(|why| Messages::default().unprintable(&why), |()| print(&page))
 }
 
-fn show(text: &[u8]) -> Exit {
+fn print(text: &[u8]) -> Exit {
     Messages::default().print(&String::from_utf8_lossy(text)).err().unwrap_or_default()
 }

@@ -117,7 +117,7 @@ fn is_metered(effective: &Effective, shot: &Shot, scene: &Scene) -> bool {
 }
 
 /// Additional data gathered for each picture.
-fn behind(job: &RenderJob) -> PictureData {
+fn picture_data(job: &RenderJob) -> PictureData {
     PictureData { costs: cost_layers::wanted(job).len(), counted: job.stats.is_some() }
 }
 
@@ -128,7 +128,7 @@ fn check(task: &Task, shot: &Shot, effective: &Effective, run_state: &RunState) 
     targets
         .try_for_each(|target| run_state.sources.spared_by_target(&target))
         .map_err(|fault| task.fail(&fault, Exit::Failed))?;
-    if let Some(fault) = picture::too_large(effective, shot.kind, behind(job), job.load.limits.memory) {
+    if let Some(fault) = picture::too_large(effective, shot.kind, picture_data(job), job.load.limits.memory) {
         return Err(task.fail(&fault, Exit::Failed));
     }
     let Settings { width, height, .. } = effective.settings;
@@ -214,11 +214,11 @@ impl Prepared<'_> {
         let found = crate::render::forecast(&self.work, progress);
         progress.finish();
         let Some(forecast) = found else { return Exit::Interrupted };
-        let picture = picture::bytes(self.effective, self.shot.kind, behind(job))
+        let picture = picture::bytes(self.effective, self.shot.kind, picture_data(job))
             + picture::bytes_of_rays(self.work.settings, forecast.rays.value);
         let format = job.stats.as_ref().map(|stats| stats.format);
         let which = dry_run::PictureId { file: self.task.file(), view: self.phrase, target: &self.shot.target };
-        let told = dry_run::told(which, &self.work, &forecast, picture, format);
+        let told = dry_run::formatted(which, &self.work, &forecast, picture, format);
         if job.stats_file().is_some() {
             run_state.foretold.push(told);
             return Exit::Done;

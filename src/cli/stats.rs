@@ -55,11 +55,11 @@ pub(super) struct Times {
 impl Times {
     /// Times in one line of text.
     pub(super) fn line(&self, eye_rays: u64) -> String {
-        format!("{}; {}", self.told().join(", "), so_many(eye_rays, "eye ray"))
+        format!("{}; {}", self.formatted_stages().join(", "), so_many(eye_rays, "eye ray"))
     }
 
     /// Stages with their times; metering only if there was any.
-    fn told(&self) -> Vec<String> {
+    fn formatted_stages(&self) -> Vec<String> {
         let is_told = |(name, time): &(&str, f64)| *name != "meter" || *time > 0.0;
         let told = self.stages().into_iter().filter(is_told);
         told.map(|(name, time)| format!("{name} {}", seconds(time))).collect()
@@ -187,7 +187,7 @@ impl PictureStats {
                 "why": r.to_string(), "rays": sample.map_or(0, |s| s.rays), "prims": r.prims,
                 "fast-octree": sample.map(|s| s.octree), "fast-bvh": sample.map(|s| s.bvh),
             })),
-            "animation": summary::shown(&making.loaded.facts).map(|(number, time)| json!({ "number": number, "time": time })),
+            "animation": summary::animation_shown(&making.loaded.facts).map(|(number, time)| json!({ "number": number, "time": time })),
             "parameters": parameters(making.accel, &making.job.params),
             "threads": rayon::current_num_threads(),
             "seconds": times.json(),
@@ -209,13 +209,19 @@ impl PictureStats {
             "profile": profile.map(Profile::json),
             "rounding": rounding,
         });
-        let text = told(making, &times, world, structure, counted.as_ref());
+        let text = statistics_text(making, &times, world, structure, counted.as_ref());
         Self { json, text }
     }
 }
 
 /// Statistics as text.
-fn told(making: &Making, times: &Times, world: &World, structure: StructureStats, counted: Option<&Counted>) -> String {
+fn statistics_text(
+    making: &Making,
+    times: &Times,
+    world: &World,
+    structure: StructureStats,
+    counted: Option<&Counted>,
+) -> String {
     let (settings, shapes) = (&making.effective.settings, &world.shapes);
     let mut lines = vec![format!(
         "{}  {}×{}  {:.1} samples  depth {}  {}  {} threads",
@@ -227,7 +233,7 @@ fn told(making: &Making, times: &Times, world: &World, structure: StructureStats
         making.accel.name(),
         rayon::current_num_threads(),
     )];
-    lines.push(format!("  time       {}", times.told().join("  ")));
+    lines.push(format!("  time       {}", times.formatted_stages().join("  ")));
     let shapes = [
         (world.triangles() as usize, "triangles"),
         (shapes.polygons.len(), "polygons"),

@@ -14,7 +14,7 @@ use crate::scene::framing::Bounds;
 use std::path::Path;
 
 /// Index of the animation shown, and its time, clamped to its end.
-pub(super) fn shown(facts: &Facts) -> Option<(usize, f64)> {
+pub(super) fn animation_shown(facts: &Facts) -> Option<(usize, f64)> {
     let (number, time) = facts.shown?;
     let end = facts.animations.get(number).map_or(time, |animation| animation.seconds);
     Some((number, time.min(end)))
@@ -48,7 +48,7 @@ impl Summary<'_> {
             self.view.to_owned(),
         ];
         let facts = &self.loaded.facts;
-        if let Some((number, time)) = shown(facts) {
+        if let Some((number, time)) = animation_shown(facts) {
             let name = facts.animations.get(number).map_or("", |animation| animation.name.as_str());
             let name = if name.is_empty() { number.to_string() } else { format!("'{name}'") };
             parts.push(format!("animation {name} at {time:.3} s"));

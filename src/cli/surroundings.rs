@@ -23,7 +23,7 @@ pub(super) fn place(look: &Look, limits: &Limits, loaded: &mut Loaded) -> Result
         None => {}
         Some(Env::BuiltIn(environment)) => loaded.scene.environment = *environment,
         Some(Env::File(file)) => {
-            let left = read::left(limits, loaded);
+            let left = read::remaining_limits(limits, loaded);
             let LoadedPanorama { mut panorama, warnings, hash } = look.env_read.panorama(file, &left)?;
             #[expect(clippy::cast_possible_truncation, reason = "an angle")]
             let rotation = (look.env_rotate % 360.0).to_radians() as f32;

@@ -31,7 +31,7 @@ pub(super) fn made_of(job: &RenderJob, batch: &Batch, shot: &Shot, loaded: &Load
     }
     let file = |FileRead { path, hash }: &FileRead| Some((path.to_str()?.to_owned(), Value::from(hex(*hash))));
     let files: Map<String, Value> = loaded.facts.files.iter().map(file).collect::<Option<_>>()?;
-    let (asked, gaps) = (asked(job, batch, shot), loaded.facts.gaps);
+    let (asked, gaps) = (settings_hash(job, batch, shot), loaded.facts.gaps);
     let text = serde_json::json!({ "asked": asked, "files": files, "gaps": gaps }).to_string();
     (text.len() <= MOST).then_some(text)
 }
@@ -44,7 +44,7 @@ pub(super) fn up_to_date(job: &RenderJob, batch: &Batch, shot: &Shot) -> Option<
     let is_same = |(path, hash): (&String, &Value)| {
         hash_of_file(Path::new(path)).is_ok_and(|found| hash.as_str() == Some(hex(found).as_str()))
     };
-    let same = made_of.get("asked").and_then(Value::as_str) == Some(asked(job, batch, shot).as_str())
+    let same = made_of.get("asked").and_then(Value::as_str) == Some(settings_hash(job, batch, shot).as_str())
         && made_of.get("gaps").and_then(Value::as_bool) == Some(false)
         && !files.is_empty()
         && files.iter().all(is_same)
@@ -79,7 +79,7 @@ fn carried(shot: &Shot) -> Option<String> {
 }
 
 /// Hash of everything that determines a picture except the contents of files: equal for equal command lines of the same program.
-fn asked(job: &RenderJob, batch: &Batch, shot: &Shot) -> String {
+fn settings_hash(job: &RenderJob, batch: &Batch, shot: &Shot) -> String {
     let how = (&job.load, &job.look, &job.sequence, job.accel, job.intersector, &job.params, job.instances);
     let which = (&batch.inputs, &shot.choice, &shot.step, shot.kind, job.allow_empty, job.strict);
     hex(xxh3_128(format!("{}\n{how:?}\n{which:?}", *PROGRAM).as_bytes()))

@@ -44,7 +44,7 @@ fn advise(study: &Study, purpose: Quality) -> Advice {
     };
     let row = own.filter(|&own| time(fastest) > (1.0 - WORTH) * time(own)).unwrap_or(fastest);
     let of_own = if own == Some(row) { "the program's own choice" } else { "not the program's own choice" };
-    let left = format!("{}, {}", study.rows[row].error.told(4), rest(&study.rows[row], study.reference.error));
+    let left = format!("{}, {}", study.rows[row].error.formatted(4), rest(&study.rows[row], study.reference.error));
     let saved = |own: usize| 100.0 * (1.0 - time(fastest) / time(own));
     let why = match own {
         Some(own) if row == own && row != fastest => {

@@ -55,7 +55,7 @@ impl Error {
     }
 
     /// Formats [`Self::rmse`] with `digits` decimals, as `<` the detection limit where it is below.
-    pub fn told(&self, digits: usize) -> String {
+    pub fn formatted(&self, digits: usize) -> String {
         let (sign, error) = (if self.rmse < self.least { "<" } else { "" }, self.known());
         let rounded = format!("{error:.digits$}");
         // A non-zero value must not be rounded to zero.
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn what_is_not_nothing_is_not_told_as_nothing() {
-        let told = |rmse: f64, least: f64| Error { rmse, least, ..error(&reference(0.0), &[all(0.5)]) }.told(4);
+        let told = |rmse: f64, least: f64| Error { rmse, least, ..error(&reference(0.0), &[all(0.5)]) }.formatted(4);
         assert_eq!([told(0.012_34, 0.0), told(0.0, 0.0), told(1e-6, 0.0)], ["0.0123", "0.0000", "1.0e-6"]);
         assert_eq!([told(0.0, 0.002), told(0.0, 2.5e-9)], ["<0.0020", "<2.5e-9"]);
     }
@@ -211,7 +211,7 @@ mod tests {
 
     #[test]
     fn an_error_far_below_that_of_the_reference_is_told_as_less_than_can_be_known() {
-        let told = |off: f64| error(&reference(off), &[all(0.4), all(0.4)]).told(4);
+        let told = |off: f64| error(&reference(off), &[all(0.4), all(0.4)]).formatted(4);
         assert_eq!([0.0, 0.06, 0.099].map(told), ["0.1000", "0.0800", "<0.0495"]);
     }
 

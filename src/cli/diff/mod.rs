@@ -63,7 +63,7 @@ pub(super) fn run(args: &DiffArgs) -> Exit {
             Ok(compared)
         });
         match drawn {
-            Ok(compared) => tell(args, &compared, &messages).unwrap_or_else(|exit| exit),
+            Ok(compared) => print_figures(args, &compared, &messages).unwrap_or_else(|exit| exit),
             Err(fault) => messages.fail(&fault.0, fault.1),
         }
     })
@@ -213,7 +213,7 @@ fn write(path: &Path, bytes: Result<Vec<u8>, ImageError>) -> Result<(), Fault> {
 }
 
 /// Prints the figures; a broken limit is reported and fails the command.
-fn tell(args: &DiffArgs, compared: &Compared, messages: &Messages) -> Result<Exit, Exit> {
+fn print_figures(args: &DiffArgs, compared: &Compared, messages: &Messages) -> Result<Exit, Exit> {
     let broken: Vec<String> = args.fail_if.iter().filter_map(|limit| limit.broken_by(compared)).collect();
     let text = if args.json { report::json(args, compared, &broken) } else { report::text(args, compared) };
     messages.print(&text)?;

@@ -1,7 +1,7 @@
 //! Ray tree of a sample as text.
 
 use super::TraceReport;
-use super::words::{goes_on, hit_surface, in_world, inside, light, object};
+use super::words::{continues, hit_surface, in_world, inside, light, object};
 use crate::accel::probe::{Extent, NodeId, Outcome, Visit};
 use crate::math::{DVec3, Vec3};
 use crate::number::grouped;
@@ -12,7 +12,7 @@ use std::fmt::Write;
 /// Writes everything, ray by ray.
 pub(super) fn write(told: &TraceReport) -> String {
     let mut out = format!("{}\n\n", told.title());
-    tell(told, 0, 0, &mut out);
+    write_query(told, 0, 0, &mut out);
     let rays = told.ray_tree.queries.len();
     let tests: u64 = told.ray_tree.queries.iter().map(|q| q.counts.n_it).sum();
     let _ =
@@ -21,7 +21,7 @@ pub(super) fn write(told: &TraceReport) -> String {
 }
 
 /// Writes a query, its steps and its children, indented by its depth in the tree.
-fn tell(told: &TraceReport, i: usize, depth: usize, out: &mut String) {
+fn write_query(told: &TraceReport, i: usize, depth: usize, out: &mut String) {
     let query = &told.ray_tree.queries[i];
     let margin = "  ".repeat(depth);
     let _ = writeln!(out, "{margin}{}", headline(told, query));
@@ -32,7 +32,7 @@ fn tell(told: &TraceReport, i: usize, depth: usize, out: &mut String) {
     }
     let _ = writeln!(out, "{margin}  = {}", ending(told, query));
     let _ = writeln!(out, "{margin}    {}", counts(query));
-    query.children.iter().for_each(|&child| tell(told, child, depth + 1, out));
+    query.children.iter().for_each(|&child| write_query(told, child, depth + 1, out));
 }
 
 fn headline(told: &TraceReport, query: &Query) -> String {
@@ -58,7 +58,7 @@ fn ending(told: &TraceReport, query: &Query) -> String {
     let Some(hit_surface) = hit_surface(told.loaded, told.world, query) else {
         return match query.question {
             Question::Occluded => "nothing in the way stops its light".into(),
-            _ if goes_on(&query.after) => "nothing more".into(),
+            _ if continues(&query.after) => "nothing more".into(),
             _ => "hits nothing".into(),
         };
     };

@@ -88,6 +88,6 @@ pub(super) fn inside(extent: &Extent, ray: &Ray) -> Option<(f64, f64)> {
 }
 
 /// Whether the query continued the search behind a hit.
-pub(super) fn goes_on(after: &Hit) -> bool {
+pub(super) fn continues(after: &Hit) -> bool {
     after.is_some()
 }

@@ -170,7 +170,7 @@ impl Archive {
     }
 
     fn new(path: &Path, reader: Box<dyn ReaderAt + Send + Sync>, length: u64) -> io::Result<Self> {
-        let damaged = |error| told(error, ArchiveFault::Damaged);
+        let damaged = |error| as_fault(error, ArchiveFault::Damaged);
         let mut chunk = vec![0; CHUNK];
         let zip = located(reader, &mut chunk, length).map_err(damaged)?;
         let directory = zip.end_offset().saturating_sub(zip.directory_offset());
@@ -263,7 +263,7 @@ impl Archive {
         if entry.is_encrypted {
             return Err(ArchiveFault::Encrypted.into());
         }
-        let found = self.zip.get_entry(entry.way).map_err(|error| told(error, ArchiveFault::Spoiled))?;
+        let found = self.zip.get_entry(entry.way).map_err(|error| as_fault(error, ArchiveFault::Spoiled))?;
         let packed: Box<dyn Read + '_> = match entry.method {
             CompressionMethod::STORE => Box::new(found.reader()),
             CompressionMethod::DEFLATE => Box::new(DeflateDecoder::new_with_buf(found.reader(), vec![0; PACKED])),
@@ -311,7 +311,7 @@ fn located<R: ReaderAt>(mut reader: R, chunk: &mut [u8], length: u64) -> Result<
 }
 
 /// Returns an error of the system as it is, and any other as a fault of the archive.
-fn told(error: rawzip::Error, fault: impl Fn(String) -> ArchiveFault) -> io::Error {
+fn as_fault(error: rawzip::Error, fault: impl Fn(String) -> ArchiveFault) -> io::Error {
     match error.into_kind() {
         rawzip::ErrorKind::IO(error) if error.kind() != ErrorKind::UnexpectedEof => error,
         other => fault(lower(&other.to_string())).into(),

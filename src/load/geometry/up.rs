@@ -39,7 +39,7 @@ pub(in crate::load) fn guess(
     otherwise: (UpAxis, &str),
 ) -> (UpAxis, String) {
     for comment in comments {
-        if let Some(axis) = said(comment) {
+        if let Some(axis) = stated_axis(comment) {
             return (axis, format!("a comment says so: '{comment}'"));
         }
     }
@@ -57,7 +57,7 @@ pub(in crate::load) fn guess(
 }
 
 /// Up axis that a comment states, in whole words: `z-up`, `Y_UP`, `Up Axis: Z`, `zup`, but not `copy_updated`.
-fn said(comment: &str) -> Option<UpAxis> {
+fn stated_axis(comment: &str) -> Option<UpAxis> {
     let text = comment.to_lowercase();
     let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
     let says = |axis: &str| {

@@ -66,18 +66,18 @@ pub(super) fn typed(mut value: Value, bytes: u64, report: &mut Report) -> Option
     simplify(&mut value);
     let map = value.as_object_mut()?;
     map.remove("animations");
-    each(map, "scenes", |scene| scene.insert_missing("nodes", || Value::Array(Vec::new())));
-    each(map, "meshes", |mesh| each(mesh, "primitives", known_attributes));
+    change_each(map, "scenes", |scene| scene.insert_missing("nodes", || Value::Array(Vec::new())));
+    change_each(map, "meshes", |mesh| change_each(mesh, "primitives", known_attributes));
     if let Some(lights) = map.get_mut("extensions").and_then(|e| e.get_mut("KHR_lights_punctual")) {
         lights
             .as_object_mut()
             .into_iter()
-            .for_each(|lights| each(lights, "lights", |light| light.remove("extensions")));
+            .for_each(|lights| change_each(lights, "lights", |light| light.remove("extensions")));
     }
     let views = map.get("bufferViews").and_then(Value::as_array).map_or(0, Vec::len);
     let images = map.get_mut("images").and_then(Value::as_array_mut).into_iter().flatten();
     images.filter(|image| !is_image(image, views)).for_each(|image| *image = Value::Object(Map::default()));
-    each(map, "cameras", planes);
+    change_each(map, "cameras", planes);
     let cameras = map.get_mut("cameras").and_then(Value::as_array_mut).into_iter().flatten();
     let is_camera = |camera: &Value| Camera::deserialize(camera.clone()).is_ok();
     cameras.filter(|camera| !is_camera(camera)).for_each(|camera| *camera = blank("perspective"));
@@ -117,7 +117,7 @@ fn planes(camera: &mut Map) {
 }
 
 /// Applies `change` to each object in a list.
-fn each<'a>(map: &mut Map<'a>, list: &str, change: impl FnMut(&mut Map<'a>)) {
+fn change_each<'a>(map: &mut Map<'a>, list: &str, change: impl FnMut(&mut Map<'a>)) {
     let elements = map.get_mut(list).and_then(Value::as_array_mut).into_iter().flatten();
     elements.filter_map(Value::as_object_mut).for_each(change);
 }

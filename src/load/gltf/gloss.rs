@@ -11,13 +11,17 @@ pub(super) fn roughness(picture: &Bitmap, gloss: f32) -> Bitmap {
     let Bitmap { name, width, height, .. } = picture;
     let (width, height, pixels) = match &picture.pixels {
         Pixels::Rgb8(_) => (1, 1, Pixels::Rgba8(vec![texel8(u8::MAX, gloss)].into())),
-        Pixels::Rgba8(texels) => (*width, *height, Pixels::Rgba8(each(texels, |&[.., alpha]| texel8(alpha, gloss)))),
-        Pixels::Rgba16(texels) => (*width, *height, Pixels::Rgba16(each(texels, |&[.., alpha]| texel16(alpha, gloss)))),
+        Pixels::Rgba8(texels) => {
+            (*width, *height, Pixels::Rgba8(map_texels(texels, |&[.., alpha]| texel8(alpha, gloss))))
+        }
+        Pixels::Rgba16(texels) => {
+            (*width, *height, Pixels::Rgba16(map_texels(texels, |&[.., alpha]| texel16(alpha, gloss))))
+        }
     };
     Bitmap { name: name.clone(), width, height, pixels }
 }
 
-fn each<T: bytemuck::Pod>(texels: &[T], change: impl Fn(&T) -> T) -> Paged<T> {
+fn map_texels<T: bytemuck::Pod>(texels: &[T], change: impl Fn(&T) -> T) -> Paged<T> {
     let mut changed = Paged::zeroed(texels.len());
     changed.iter_mut().zip(texels).for_each(|(to, from)| *to = change(from));
     changed

@@ -219,7 +219,7 @@ impl<'a> Walk<'a> {
     }
 
     fn wrong_type(&mut self, value: &Value, what: &str) {
-        self.fault(Code::TypeMismatch, format!("{} where {what} should be", show(value)));
+        self.fault(Code::TypeMismatch, format!("{} where {what} should be", shorten_value(value)));
     }
 
     fn number(&mut self, value: &Value, range: Range) {
@@ -251,7 +251,7 @@ impl<'a> Walk<'a> {
 
     fn index(&mut self, value: &Value, list: &str) {
         let Some(index) = whole(value) else {
-            return self.fault(Code::InvalidIndex, format!("{} where an index should be", show(value)));
+            return self.fault(Code::InvalidIndex, format!("{} where an index should be", shorten_value(value)));
         };
         let target = match list {
             "KHR_lights_punctual" => self.root.pointer("/extensions/KHR_lights_punctual/lights"),
@@ -303,7 +303,7 @@ impl<'a> Walk<'a> {
             self.at(format_args!("[{i}]"), |walk| {
                 walk.value(element, of);
                 if unique && !seen.insert(key(element)) {
-                    walk.fault(Code::DuplicateElements, format!("{} again", show(element)));
+                    walk.fault(Code::DuplicateElements, format!("{} again", shorten_value(element)));
                 }
             });
         }
@@ -350,7 +350,7 @@ pub(super) fn position(value: &impl Tree) -> Option<usize> {
 }
 
 /// Shortens a value for a message.
-fn show(value: &Value) -> String {
+fn shorten_value(value: &Value) -> String {
     match value {
         Value::Object(_) => "an object".into(),
         Value::Array(_) => "a list".into(),

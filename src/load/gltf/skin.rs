@@ -35,7 +35,7 @@ pub(super) fn load(reader: Reader, graph: &Graph, posed: &[PosedMesh], report: &
             check_skeleton(root, graph, i, report);
             let matrices = matrices_of(reader, graph, i, report)?;
             let posed = |matrix: &DMat4| matrix.transform_point3(middles[i]);
-            let (lo, hi) = around(matrices.iter().map(posed));
+            let (lo, hi) = finite_bounds(matrices.iter().map(posed));
             let center = center_of_most(lo, hi, spread(matrices.len()).map(|joint| posed(&matrices[joint])));
             Some(Skin { matrices, center })
         })
@@ -61,14 +61,14 @@ fn middles(reader: Reader, posed: &[PosedMesh]) -> Vec<DVec3> {
         of_skin.extend(sampled.filter(|p| p.is_finite()));
     }
     let middle = |points: Vec<DVec3>| {
-        let (lo, hi) = around(points.iter().copied());
+        let (lo, hi) = finite_bounds(points.iter().copied());
         if points.is_empty() { DVec3::ZERO } else { center_of_most(lo, hi, spread(points.len()).map(|i| points[i])) }
     };
     points.into_iter().map(middle).collect()
 }
 
 /// Minimum and maximum of the finite points.
-fn around(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+fn finite_bounds(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     points.filter(|p| p.is_finite()).fold(empty, |(lo, hi), p| (lo.min(p), hi.max(p)))
 }

@@ -133,7 +133,7 @@ impl Pictures {
     /// Returns how picture `i` uses its alpha channel.
     pub(super) fn alpha(&self, i: usize) -> Alpha {
         let (mut lowest, mut highest) = (1.0f32, 0.0f32);
-        each(&self.sources[i], |p| (lowest, highest) = (lowest.min(p[3]), highest.max(p[3])));
+        each_texel(&self.sources[i], |p| (lowest, highest) = (lowest.min(p[3]), highest.max(p[3])));
         if lowest == 1.0 {
             Alpha::Solid
         } else if highest == 0.0 {
@@ -146,7 +146,7 @@ impl Pictures {
     /// Returns whether red, green and blue are equal in every texel.
     pub(super) fn is_grey(&self, i: usize) -> bool {
         let mut grey = true;
-        each(&self.sources[i], |p| grey &= p[0] == p[1] && p[1] == p[2]);
+        each_texel(&self.sources[i], |p| grey &= p[0] == p[1] && p[1] == p[2]);
         grey
     }
 
@@ -156,7 +156,7 @@ impl Pictures {
         /// Spread of the channels that compression leaves in grey.
         const GREY: f32 = 0.05;
         let (mut unit, mut all) = (0u64, 0u64);
-        each(&self.sources[i], |[r, g, b, _]| {
+        each_texel(&self.sources[i], |[r, g, b, _]| {
             let n = crate::math::Vec3::new(r, g, b) * 2.0 - 1.0;
             let is_grey = (n - n.z).abs().max_element() < GREY;
             unit += u64::from((n.length() - 1.0).abs() < 0.1 && n.z > 0.0 && !is_grey);
@@ -179,7 +179,7 @@ impl Pictures {
     fn coded(&self, i: usize, channel: Channel) -> Bitmap {
         let Bitmap { name, width, height, .. } = &self.sources[i];
         let mut pixels = Vec::with_capacity(*width as usize * *height as usize);
-        each(&self.sources[i], |p| pixels.push(to16(grey(to_srgb(pick(p, channel))))));
+        each_texel(&self.sources[i], |p| pixels.push(to16(grey(to_srgb(pick(p, channel))))));
         Bitmap { name: name.clone(), width: *width, height: *height, pixels: Pixels::Rgba16(pixels.into()) }
     }
 
@@ -243,7 +243,7 @@ fn texel(bitmap: &Bitmap, at: usize) -> Option<[f32; 4]> {
     }
 }
 
-fn each(bitmap: &Bitmap, mut look: impl FnMut([f32; 4])) {
+fn each_texel(bitmap: &Bitmap, mut look: impl FnMut([f32; 4])) {
     match &bitmap.pixels {
         Pixels::Rgb8(bytes) => threes(bytes).iter().for_each(|&t| look(solid8(t))),
         Pixels::Rgba8(texels) => texels.iter().for_each(|&t| look(from8(t))),

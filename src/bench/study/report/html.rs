@@ -105,7 +105,7 @@ fn plot(study: &Study) -> String {
             "<path class=\"{class}\" transform=\"translate({px:.1} {py:.1})\" d=\"{shape}\"><title>{}: {}, RMSE {}</title></path>",
             escaped(&row.setting.flags),
             seconds(row.cpu.median()),
-            escaped(&row.error.told(4))
+            escaped(&row.error.formatted(4))
         );
     }
     svg + "</svg>"
@@ -166,7 +166,7 @@ fn table(study: &Study) -> String {
             seconds(row.cpu.max()),
             seconds(row.wall.median()),
             row.samples,
-            escaped(&e.told(5)),
+            escaped(&e.formatted(5)),
             e.noise,
             e.bias,
             e.max,

@@ -36,7 +36,7 @@ pub fn row(row: &Row) -> String {
         row.setting.flags,
         seconds(row.cpu.median()),
         row.samples,
-        error.told(4),
+        error.formatted(4),
         error.noise,
         error.bias,
         error.max,
@@ -50,7 +50,8 @@ pub fn conclusion(study: &Study) -> String {
     for i in study.front() {
         let row = &study.rows[i];
         // Writing to a string does not fail.
-        let _ = writeln!(out, "  {:>10}  {:>7}  {}", seconds(row.cpu.median()), row.error.told(4), row.setting.flags);
+        let _ =
+            writeln!(out, "  {:>10}  {:>7}  {}", seconds(row.cpu.median()), row.error.formatted(4), row.setting.flags);
     }
     out += "\nuse\n";
     for advice in study.advice() {

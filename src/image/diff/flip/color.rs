@@ -36,7 +36,7 @@ const AT_KNEE: f32 = 0.95;
 pub(super) type Seen = [f32; 3];
 
 /// Perceived colour of each pixel.
-pub(super) fn seen(picture: Displayed, pixels_per_degree: f64) -> Vec<Seen> {
+pub(super) fn perceived(picture: Displayed, pixels_per_degree: f64) -> Vec<Seen> {
     let (taps, [first, second]) = taps(pixels_per_degree);
     let opponent: Vec<[f32; 4]> = picture.pixels.par_iter().map(|&p| opponent(p)).collect();
     let rows = filtered(picture.width, &opponent, &taps, Along::Rows);
@@ -52,7 +52,7 @@ pub(super) fn difference(a: Seen, b: Seen, most: f32) -> f32 {
 }
 
 /// Largest difference of two colours that can be displayed, pure green and pure blue.
-pub(super) fn most() -> f32 {
+pub(super) fn largest_difference() -> f32 {
     libm::powf(distance(hunt(lab([0.0, 1.0, 0.0])), hunt(lab([0.0, 0.0, 1.0]))), POWER)
 }
 

@@ -29,9 +29,9 @@ pub struct Displayed<'a> {
 
 /// FLIP of each pixel; both pictures have the same size.
 pub fn flip(reference: Displayed, test: Displayed, pixels_per_degree: f64) -> Vec<f32> {
-    let [seen, other] = [reference, test].map(|picture| color::seen(picture, pixels_per_degree));
+    let [seen, other] = [reference, test].map(|picture| color::perceived(picture, pixels_per_degree));
     let [marks, others] = [reference, test].map(|picture| features::features(picture, pixels_per_degree));
-    let most = color::most();
+    let most = color::largest_difference();
     let colors = seen.par_iter().zip(&other).map(|(&a, &b)| color::difference(a, b, most));
     let features = marks.par_iter().zip(&others).map(|(&a, &b)| features::difference(a, b));
     colors.zip(features).map(|(color, feature)| libm::powf(color, 1.0 - feature)).collect()

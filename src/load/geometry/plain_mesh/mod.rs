@@ -209,7 +209,7 @@ pub(in crate::load) fn load(
 
 /// [`geometry`] for plain triangles, without making statements.
 fn plain_triangles(bare: PlainMesh) -> Geometry {
-    let (colors, alphas) = parts(bare.colors);
+    let (colors, alphas) = split_opacity(bare.colors);
     let mut soup = Soup { positions: bare.positions, colors, alphas, ..Soup::default() };
     // A list with spare capacity is copied.
     let triangles = try_cast_vec(bare.corners).unwrap_or_else(|(_, corners)| corners.as_chunks().0.to_vec());
@@ -227,7 +227,7 @@ fn plain_triangles(bare: PlainMesh) -> Geometry {
 }
 
 /// Splits colours from opacities, which are empty where all are opaque.
-fn parts(colors: Vec<[f32; 4]>) -> (Vec<[f32; 3]>, Vec<f32>) {
+fn split_opacity(colors: Vec<[f32; 4]>) -> (Vec<[f32; 3]>, Vec<f32>) {
     let alphas = color::opacities(&colors);
     (colors.into_par_iter().with_min_len(MANY).map(|[r, g, b, _]| [r, g, b]).collect(), alphas)
 }
@@ -282,7 +282,7 @@ fn geometry(mut bare: PlainMesh, file: &Path, warnings: &mut Warnings) -> Geomet
     let wire_corners = edges.iter().flatten().map(end).collect();
     let numbered = corners.par_iter().zip(&numbers).with_min_len(MANY);
     let corners = numbered.map(|(&i, &uv)| Corner { uv, ..corner(i) }).collect();
-    let (colors, alphas) = parts(colors);
+    let (colors, alphas) = split_opacity(colors);
     let mut soup = Soup { positions, uvs, normals, colors, alphas, corners, wire_corners };
     if !is_cloud {
         soup.leave_out_unused(&[]);

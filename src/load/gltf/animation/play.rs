@@ -83,7 +83,7 @@ pub(in crate::load::gltf) fn play(
         let (pointer, whole) = match &channel.target {
             Target::Nothing => continue,
             Target::Lost(why) => {
-                Fault::Target(Code::AnimationPointerPath, why.clone()).tell(&place, player.report);
+                Fault::Target(Code::AnimationPointerPath, why.clone()).report(&place, player.report);
                 continue;
             }
             Target::Node(node, property) => (format!("{}/{}", Entry::Node(*node).pointer(), property.name()), None),
@@ -97,7 +97,7 @@ pub(in crate::load::gltf) fn play(
             let (code, text) = (Code::AnimationDuplicateTargets, player.again(&channel.target));
             player.report.warn_with(code, place.channel, text, "the first counts");
         } else if let Err(fault) = player.channel(channel, &place)? {
-            fault.tell(&place, player.report);
+            fault.report(&place, player.report);
         }
     }
     Ok(player.pose)
@@ -147,7 +147,7 @@ enum Fault {
 }
 
 impl Fault {
-    fn tell(self, place: &ChannelSource, report: &mut Report) {
+    fn report(self, place: &ChannelSource, report: &mut Report) {
         let left_out = "the channel is left out";
         match self {
             Self::Target(code, text) => report.warn_with(code, format!("{}.target", place.channel), text, left_out),
@@ -223,7 +223,7 @@ impl<'a> Player<'a, '_> {
                 Some(times)
             }
             Err(fault) => {
-                fault.tell(place, self.report);
+                fault.report(place, self.report);
                 None
             }
         };
