@@ -307,8 +307,25 @@ impl Patch<'_> {
         store: &TextureStore,
     ) -> Option<Vec3> {
         let texel = self.texel(map, ColorSpace::Linear, store).truncate();
+        if let Some(frame) = self.baked_frame(map) {
+            return smooth_normal(self.placement, frame.decode(texel, scale));
+        }
         let (tangent, bitangent) = self.tangents_of_map(normal, map)?;
         turned_by_texel(normal, [tangent, bitangent], texel, scale)
+    }
+
+    /// Frame in which a normal map is decoded; `None` without normals, or tangents along its coordinates.
+    #[inline]
+    fn baked_frame(&self, map: &TextureRef) -> Option<BakedFrame> {
+        let made_along = self.mesh.tangents_along;
+        if made_along.is_some_and(|along| along.set != map.uv_set) {
+            return None;
+        }
+        let (normal, tangent) = (self.mix(&self.mesh.normals)?, self.mix(&self.mesh.tangents)?);
+        let turn = FrameTurn::new(made_along, map);
+        let frame = BakedFrame::new(normal, tangent);
+        let frame = turn.map_or(frame, |turn| turn.apply_to_baked(frame));
+        frame.is_valid().then_some(frame)
     }
 
     /// The normal as the material's bump map turns it: by the slope of the heights, from differences one texel wide.
@@ -326,6 +343,42 @@ impl Patch<'_> {
         let dv = rise(Vec2::new(0.0, 0.5 * texel.y), texel.y) * material.bump_scale;
         // v runs down, against the bitangent.
         (normal - tangent * du + bitangent * dv).try_normalize()
+    }
+}
+
+/// Tangent frame of a mesh at a point, in its own coordinates: interpolated from the corners, and neither normalized nor made
+/// perpendicular.
+///
+/// Maps are baked so that normals decoded in this frame are those of the finely modelled surface (M. Mikkelsen, *Simulation of
+/// Wrinkled Surfaces Revisited*, 2008).
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct BakedFrame {
+    pub normal: Vec3,
+    pub tangent: Vec3,
+    pub bitangent: Vec3,
+}
+
+impl BakedFrame {
+    /// Frame of an interpolated normal and tangent, which has the handedness of the bitangent in its last component.
+    #[inline(always)]
+    pub(crate) fn new(normal: Vec3, tangent: Vec4) -> Self {
+        let sign = if tangent.w < 0.0 { -1.0 } else { 1.0 };
+        let tangent = tangent.truncate();
+        Self { normal, tangent, bitangent: normal.cross(tangent) * sign }
+    }
+
+    /// Whether its vectors span space.
+    #[inline(always)]
+    pub(crate) fn is_valid(&self) -> bool {
+        let length = self.bitangent.length_squared();
+        (length > 0.0) & (length < f32::INFINITY)
+    }
+
+    /// The normal of a texel of a normal map, whose x and y are scaled; of any length.
+    #[inline(always)]
+    pub(crate) fn decode(&self, texel: Vec3, scale: f32) -> Vec3 {
+        let texel = texel * 2.0 - 1.0;
+        self.tangent * (texel.x * scale) + self.bitangent * (texel.y * scale) + self.normal * texel.z
     }
 }
 
@@ -416,6 +469,18 @@ impl FrameTurn {
     pub(crate) fn apply(&self, (tangent, sign): (Vec3, f32), normal: Vec3) -> (Vec3, f32) {
         let bitangent = normal.cross(tangent) * sign;
         (tangent * self.along.x - bitangent * self.along.y, sign * self.sign)
+    }
+
+    /// [`Self::apply`] for a frame that is not orthonormal.
+    #[inline(always)]
+    pub(crate) fn apply_to_baked(&self, frame: BakedFrame) -> BakedFrame {
+        let BakedFrame { normal, tangent, bitangent } = frame;
+        let turned = tangent * self.along.x - bitangent * self.along.y;
+        BakedFrame {
+            normal,
+            tangent: turned,
+            bitangent: (bitangent * self.along.x + tangent * self.along.y) * self.sign,
+        }
     }
 }
 

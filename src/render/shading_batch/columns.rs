@@ -14,7 +14,7 @@ use crate::math::simd::{Kernel, Level, Simd};
 use crate::math::{Vec3, Vec4};
 use crate::render::media::MediaTable;
 use crate::render::media::absorption::Absorption;
-use crate::render::patch::smooth_normal;
+use crate::render::patch::{BakedFrame, smooth_normal};
 use crate::render::shade::{Bsdf, ShadingFrame};
 use crate::render::shade_hits::TracedRays;
 use crate::render::surface::{faces, facing, side_of};
@@ -343,6 +343,12 @@ impl HitData {
     #[inline(always)]
     pub(super) fn own_normal(&self, placement: &Placement, i: usize) -> Vec3 {
         smooth_normal(placement, self.mix(i, self.faces.normals(i))).unwrap_or(self.faces.outward(i))
+    }
+
+    /// Interpolated tangent frame.
+    #[inline(always)]
+    pub(super) fn baked_frame(&self, i: usize) -> BakedFrame {
+        BakedFrame::new(self.mix(i, self.faces.normals(i)), self.mix(i, self.faces.tangents(i)))
     }
 
     /// Computes the view direction and the visible side.

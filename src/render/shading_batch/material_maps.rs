@@ -1,14 +1,16 @@
 //! Maps of a material and vertex colours that are read side by side for the points of a batch.
 
 use super::PlacedMesh;
-use super::columns::{Column, Columns, Found, HitData, LANES, POINTS, ShadingBatch, get, padded, put};
+use super::columns::{Columns, Found, HitData, LANES, POINTS, ShadingBatch, get, padded, put};
 use super::cones::Cones;
 use super::constants::{other_maps, reads_reflectance};
 use super::painted::Painted;
 use crate::math::simd::{Kernel, Simd};
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::render::context::Context;
-use crate::render::patch::{FrameTurn, Turn, given_tangent, mixed_color, turned_by_texel, turning_of};
+use crate::render::patch::{
+    BakedFrame, FrameTurn, Turn, given_tangent, mixed_color, smooth_normal, turned_by_texel, turning_of,
+};
 use crate::render::shade::{MetalRoughInputs, PhongInputs, base_color, base_space, has_inside, is_cut_out, occlusion};
 use crate::render::surface::{facing, side_of};
 use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, changes};
@@ -459,35 +461,17 @@ impl Kernel for TurnNormals<'_> {
         let Self { given, found, painted, points, placement, smooth, scale, turn } = self;
         let placement = *placement;
         let mut turns = Turns::default();
-        for i in 0..points.min(POINTS) {
-            put(&mut turns.own, i, if smooth { given.own_normal(&placement, i) } else { given.faces.outward(i) });
-        }
-        for i in 0..points.min(POINTS) {
-            let tangent = given_tangent(&placement, given.mix(i, given.faces.tangents(i)), get(&turns.own, i));
-            let (tangent, sign) = tangent.unwrap_or((Vec3::NAN, 1.0));
-            put(&mut turns.tangent, i, tangent);
-            turns.sign[i] = sign;
-        }
-        if let Some(turn) = turn {
-            for i in 0..points.min(POINTS) {
-                let (own, frame) = (get(&turns.own, i), (get(&turns.tangent, i), turns.sign[i]));
-                let (tangent, sign) = turn.apply(frame, own);
-                put(&mut turns.tangent, i, tangent);
-                turns.sign[i] = sign;
-            }
-        }
-        for i in 0..points.min(POINTS) {
-            let (own, tangent) = (get(&turns.own, i), get(&turns.tangent, i));
-            let frame = [tangent, own.cross(tangent) * turns.sign[i]];
-            let turned = turned_by_texel(own, frame, painted.normal_texel(i), scale).unwrap_or(own);
-            put(&mut turns.turned, i, turned);
+        if smooth {
+            turns.turn_smooth(given, painted, points, &placement, scale, turn);
+        } else {
+            turns.turn_flat(given, painted, points, &placement, scale, turn);
         }
         for i in 0..points.min(POINTS) {
             let geometric = get(&found.geometric, i);
             let side = side_of(get(&turns.own, i), geometric);
             put(&mut found.normal, i, facing(get(&turns.turned, i) * side, geometric, get(&found.view, i)));
             // Without a tangent it would need the coordinates around.
-            found.certain[i] &= u32::from(turns.tangent[0][i].is_finite());
+            found.certain[i] &= turns.has_tangent[i];
         }
     }
 }
@@ -496,14 +480,82 @@ impl Kernel for TurnNormals<'_> {
 struct Turns {
     own: Columns,
     tangent: Columns,
-    sign: Column,
+    bitangent: Columns,
     turned: Columns,
+    /// 1 where there is a tangent.
+    has_tangent: [u32; POINTS],
 }
 
 impl Default for Turns {
     fn default() -> Self {
         let three = [[0.0; POINTS]; 3];
-        Self { own: three, tangent: three, sign: [0.0; POINTS], turned: three }
+        Self { own: three, tangent: three, bitangent: three, turned: three, has_tangent: [0; POINTS] }
+    }
+}
+
+impl Turns {
+    /// Turns interpolated normals in the frames in which maps are baked.
+    #[inline(always)]
+    fn turn_smooth(
+        &mut self,
+        given: &HitData,
+        painted: &Painted,
+        points: usize,
+        placement: &Placement,
+        scale: f32,
+        turn: Option<FrameTurn>,
+    ) {
+        for i in 0..points.min(POINTS) {
+            put(&mut self.own, i, given.own_normal(placement, i));
+        }
+        for i in 0..points.min(POINTS) {
+            let frame = given.baked_frame(i);
+            put(&mut self.tangent, i, frame.tangent);
+            put(&mut self.bitangent, i, frame.bitangent);
+        }
+        if let Some(turn) = turn {
+            for i in 0..points.min(POINTS) {
+                let (tangent, bitangent) = (get(&self.tangent, i), get(&self.bitangent, i));
+                let frame = turn.apply_to_baked(BakedFrame { normal: Vec3::ZERO, tangent, bitangent });
+                put(&mut self.tangent, i, frame.tangent);
+                put(&mut self.bitangent, i, frame.bitangent);
+            }
+        }
+        for i in 0..points.min(POINTS) {
+            let normal = given.mix(i, given.faces.normals(i));
+            let frame = BakedFrame { normal, tangent: get(&self.tangent, i), bitangent: get(&self.bitangent, i) };
+            self.has_tangent[i] = u32::from(frame.is_valid());
+            let turned = smooth_normal(placement, frame.decode(painted.normal_texel(i), scale));
+            put(&mut self.turned, i, turned.unwrap_or(get(&self.own, i)));
+        }
+    }
+
+    /// Turns normals of faces in frames that are perpendicular to them.
+    #[inline(always)]
+    fn turn_flat(
+        &mut self,
+        given: &HitData,
+        painted: &Painted,
+        points: usize,
+        placement: &Placement,
+        scale: f32,
+        turn: Option<FrameTurn>,
+    ) {
+        for i in 0..points.min(POINTS) {
+            let own = given.faces.outward(i);
+            let tangent = given_tangent(placement, given.mix(i, given.faces.tangents(i)), own);
+            let (tangent, sign) = tangent.unwrap_or((Vec3::NAN, 1.0));
+            let (tangent, sign) = turn.map_or((tangent, sign), |turn| turn.apply((tangent, sign), own));
+            put(&mut self.own, i, own);
+            put(&mut self.tangent, i, tangent);
+            put(&mut self.bitangent, i, own.cross(tangent) * sign);
+            self.has_tangent[i] = u32::from(tangent.x.is_finite());
+        }
+        for i in 0..points.min(POINTS) {
+            let (own, frame) = (get(&self.own, i), [get(&self.tangent, i), get(&self.bitangent, i)]);
+            let turned = turned_by_texel(own, frame, painted.normal_texel(i), scale).unwrap_or(own);
+            put(&mut self.turned, i, turned);
+        }
     }
 }
 
