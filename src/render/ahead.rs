@@ -1,5 +1,5 @@
-//! First samples of all pixels of a small picture that were traced before it, to see what they show: the picture has them
-//! already.
+//! First samples of every pixel of a small picture, traced by the search for fireflies and kept, so that the picture need not
+//! trace them again.
 
 use super::Settings;
 use super::layers::FirstSurface;
@@ -7,21 +7,21 @@ use super::whitted::{Sample, Tracer};
 use crate::accel::Accel;
 use std::ops::Range;
 
-/// First samples of pixels, equally many of each.
+/// The first samples of every pixel, equally many of each.
 #[derive(Debug)]
 pub(super) struct Ahead {
     columns: usize,
-    /// Of each pixel, a power of two.
+    /// Samples of each pixel, a power of two.
     samples: u32,
-    /// Pixel by pixel, row by row.
+    /// All samples, pixel by pixel, row by row.
     each: Vec<Sample>,
-    /// Whether rays of each were spread by chance.
+    /// Whether the rays of each sample were spread by random choices.
     by_chance: Vec<bool>,
-    /// What layers are made of; empty unless they are wanted.
+    /// First surface of each sample, for the picture's layers; empty unless layers are wanted.
     firsts: Vec<FirstSurface>,
 }
 
-/// Some samples of one pixel.
+/// A range of samples of one pixel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OfPixel<'a> {
     pub samples: &'a [Sample],
@@ -30,7 +30,7 @@ pub(super) struct OfPixel<'a> {
 }
 
 impl Ahead {
-    /// Room for so many samples of each pixel.
+    /// Makes room for `samples` samples of each pixel.
     pub(super) fn new(settings: &Settings, samples: u32) -> Self {
         let (columns, rows) = (settings.width as usize, settings.height as usize);
         let count = columns * rows * samples as usize;
@@ -38,7 +38,7 @@ impl Ahead {
         Self { columns, samples, each: vec![Sample::default(); count], by_chance: vec![false; count], firsts }
     }
 
-    /// Keeps the `index`th samples of these pixels, which were traced last.
+    /// Keeps the samples of these pixels that `tracer` has just traced as their `index`th.
     pub(super) fn keep<A: Accel, P>(&mut self, index: u32, (columns, rows): (&[u32], &[u32]), tracer: &Tracer<A, P>) {
         for (i, (&x, &y)) in columns.iter().zip(rows).enumerate() {
             let at = self.place((x, y)) + index as usize;
@@ -49,7 +49,7 @@ impl Ahead {
         }
     }
 
-    /// The samples of one pixel with these numbers, no more than there are.
+    /// Returns the samples of one pixel whose indices are in `numbers`; indices past the last kept sample are left out.
     pub(super) fn of(&self, pixel: (u32, u32), numbers: Range<u32>) -> OfPixel<'_> {
         let start = self.place(pixel);
         let range = start + numbers.start as usize..start + numbers.end.min(self.samples) as usize;
@@ -79,7 +79,7 @@ mod tests {
     use crate::render::{Job, World};
     use crate::scene::{Environment, Material, MetalRough, Reflection, Scene, Sphere};
 
-    /// A ball of frosted glass.
+    /// Returns a scene of one ball of frosted glass.
     fn frosted() -> Scene {
         let glass = MetalRough { transmission: 1.0, roughness: 0.4, metallic: 0.0, ..MetalRough::default() };
         let material = Material { reflection: Reflection::MetalRough(glass), ..Material::plain() };
@@ -94,7 +94,7 @@ mod tests {
         let accel = AnyAccel::build(AccelKind::None, &world.shapes, &AccelParams::DEFAULT);
         let textures = TextureStore::new(&scene);
         let view = View::look_at(DVec3::new(0.3, 0.2, 4.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.7));
-        // Sixteen of each pixel, four and one, and more or fewer than pixels start with anyway.
+        // Sixteen samples a pixel are kept, four, one, and then more and fewer than pixels start with by default.
         for (width, height, min_samples, max_samples) in
             [(40, 34, 1, 64), (110, 100, 1, 16), (230, 210, 1, 4), (40, 34, 32, 64), (40, 34, 1, 8)]
         {

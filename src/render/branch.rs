@@ -1,4 +1,4 @@
-//! The rays that go on from a shaded point: mirrored, refracted, split by wavelength, spread by roughness.
+//! Secondary rays of a shaded point: mirrored, refracted, split by wavelength, spread by roughness.
 
 use super::context::Context;
 use super::draws::{Purpose, SampleSet};
@@ -14,41 +14,41 @@ use crate::accel::{Accel, Hit, NO_PRIM, Ray};
 use crate::math::Vec3;
 use crate::scene::Material;
 
-/// What rays that go on ask of the surface they start on.
+/// What secondary rays need to know of the surface they start on.
 pub(super) trait ShadingPoint {
-    /// Its material, by number too.
+    /// Index of the surface's material, and the material.
     fn material(&self) -> (u32, &Material);
 
-    /// How it is seen.
+    /// Normals and view direction at the point.
     fn seen(&self) -> ShadingFrame;
 
     /// Whether the front of the face was hit.
     fn is_front(&self) -> bool;
 
-    /// How much the normal, before maps turn it, varies across the ray's cone: the squares of the angles, summed over both axes.
+    /// Variation of the normal (before normal maps) across the ray's cone: the squares of the angles, summed over both axes.
     fn bend(&self, context: &Context) -> f32;
 
-    /// A ray from here along `dir`, of unit length, without end.
+    /// Returns an unbounded ray from the point along `dir`, which has unit length.
     fn ray(&self, dir: Vec3, sample: u32) -> Ray;
 
-    /// Where rays towards `dir` start, and where they would if nothing were rounded.
+    /// Returns the origin of rays towards `dir`, and where it would be if nothing were rounded.
     fn set_off(&self, dir: Vec3) -> [Vec3; 2];
 
-    /// The face that rays from here cannot meet again; [`NO_PRIM`] on round shapes, which they may.
+    /// Prim that rays from the point cannot hit again; [`NO_PRIM`] on round shapes, which they may hit again.
     fn excluded(&self) -> u32;
 
-    /// A ray to the other side along `dir`, and how far it may go until it has left all that is the same surface.
+    /// Returns a ray to the other side along `dir`, and the distance within which its hits still belong to this surface.
     ///
-    /// It starts on this side: what touches the surface from behind, as a table does a glass that stands on it, lies no farther
-    /// away than the error of the place, and a ray that starts beyond that would never meet it. Only round shapes, which such a
-    /// ray would meet again, are left first.
+    /// The ray starts on this side: what touches the surface from behind, as a table touches a glass standing on it, may lie
+    /// closer than the error of the hit point, and a ray that starts beyond that error would miss it. Only on round shapes, which
+    /// the ray would hit again, does it start on the other side.
     fn ray_through(&self, dir: Vec3, sample: u32) -> (Ray, f32) {
         let exclude = self.excluded();
         if exclude == NO_PRIM {
             return (self.ray(dir, sample), 0.0);
         }
         let ([origin, start], normal) = (self.set_off(-dir), self.seen().geometric);
-        // As far behind the surface as before it, and as much again.
+        // The distance to behind the surface is that to before it; twice both for safety.
         let room = 4.0 * (normal.dot(start - origin) / normal.dot(dir)).abs();
         (Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude, sample }, room)
     }
@@ -58,18 +58,18 @@ pub(super) trait ShadingPoint {
 pub(super) struct PathVertex<'a, G> {
     pub ray: &'a Ray,
     pub hit: &'a Hit,
-    /// The ray so far, its weight that of the surface.
+    /// The path up to this point; its weight is that of the surface.
     pub path: Path,
-    /// Width of the ray's cone here.
+    /// Width of the ray's cone at the point.
     pub width: f32,
     pub surface: &'a G,
     pub bsdf: &'a Bsdf,
-    /// Whether it lies where the ray has crossed another surface just before.
+    /// Whether the ray has crossed another surface at the same place just before.
     pub touches: bool,
 }
 
 impl<G: ShadingPoint> PathVertex<'_, G> {
-    /// The indices on both sides for light of `band`.
+    /// Returns the refractive indices on both sides for light of `band`.
     pub(super) fn crossing(&self, context: &Context, table: &mut MediaTable, band: Option<u8>) -> Crossing {
         let media = self.path.media;
         let Some((ior, dispersion)) = self.bsdf.refraction() else { return table.pass(media) };
@@ -88,9 +88,9 @@ impl<G: ShadingPoint> PathVertex<'_, G> {
         self.bsdf.bounce_weights(self.cosine(), crossing)
     }
 
-    /// A ray that starts here, and what it comes from: see [`Queue`](super::wave::Queue).
+    /// Returns a ray that starts at the point, and the hit behind which it starts: see [`Queue`](super::wave::Queue).
     pub(super) fn start(&self, class: RayClass, dir: Vec3) -> (Ray, Hit) {
-        // Before this surface what was crossed before it would be met again.
+        // A ray that starts before this surface would also hit again the touching surface that it has just crossed.
         if class != RayClass::Refracted || self.touches {
             return (self.surface.ray(dir, self.ray.sample), Hit::MISS);
         }
@@ -98,13 +98,14 @@ impl<G: ShadingPoint> PathVertex<'_, G> {
         (ray, Hit { t: room, ..*self.hit })
     }
 
-    /// Cosine of the view.
+    /// Cosine between the shading normal and the view direction.
     fn cosine(&self) -> f32 {
         let ShadingFrame { normal, view, .. } = self.surface.seen();
         normal.dot(view)
     }
 
-    /// What a ray that starts here carries; directions turn `factor` times as far as normals do.
+    /// Returns the path of a ray that starts at the point; its direction turns by `factor` times the angle by which the normal
+    /// turns.
     fn bounced(&self, context: &Context, weight: Vec3, factor: f32) -> Path {
         let depth = self.path.depth + 1;
         let cone_spread = glint::behind(self.surface.bend(context), self.path.cone_spread, factor);
@@ -121,19 +122,19 @@ impl<G: ShadingPoint> PathVertex<'_, G> {
     }
 }
 
-/// The facets that stand in for a rough surface.
+/// Microfacets of a rough surface at one point, and the rays that it spreads.
 pub(super) struct Rough {
     pub lobe: Lobe,
     pub rays: u32,
     spread: SampleSet,
-    /// Whether rays that it mirrors, and those that it lets through, see no hotspot.
+    /// Whether its mirrored rays, and its transmitted rays, skip the hotspot because that is sampled directly.
     hotspot_sampled: HotspotSampled,
 }
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
-    /// Queues the secondary rays of a point that have enough weight.
+    /// Queues the secondary rays of a point that carry enough weight.
     pub(super) fn reflect_and_refract<G: ShadingPoint>(&mut self, point: &PathVertex<G>, crossing: &Crossing) {
-        // A volume that bends nothing is clear however rough its surface is.
+        // Between equal indices a volume is clear, however rough its surface.
         let bends = crossing.n_i != crossing.n_t || !has_inside(point.surface.material().1);
         if let Some(lobe) = point.bsdf.lobe(point.surface.seen().normal).filter(|_| bends) {
             return self.spread(point, crossing, lobe);
@@ -144,7 +145,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             self.reflect(point, bounce_weights.reflected);
             return self.send_refracted(point, weight, crossing, point.path.band);
         }
-        // White light splits: each part of the spectrum has its own index from here on, and its own share that is mirrored.
+        // White light splits: from here on each band of the spectrum has its own index, and its own reflected share.
         let cosine = point.cosine();
         let reflected = self.split_bounce_weights(point, cosine).reflected;
         self.reflect(point, reflected);
@@ -155,7 +156,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// The bounce weights of light that has all its wavelengths, of which each has its own.
+    /// Returns the bounce weights of light of all wavelengths: the sum over the bands, each with its own index.
     fn split_bounce_weights<G: ShadingPoint>(&mut self, point: &PathVertex<G>, cosine: f32) -> BounceWeights {
         let mut all = BounceWeights::default();
         for (i, band) in (0u8..).zip(&self.context.bands) {
@@ -168,17 +169,18 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         all
     }
 
-    /// Whether light that is let in here has all its wavelengths still, and loses sight of some.
+    /// Whether white light that enters here splits into bands.
     pub(super) fn splits<G>(&self, point: &PathVertex<G>) -> bool {
         let disperses = point.bsdf.refraction().is_some_and(|(_, dispersion)| dispersion > 0.0);
         disperses && point.bsdf.lets_light_in() && point.path.band.is_none()
     }
 
-    /// Spreads rays over what a rough surface mirrors and lets through: several off the first, one off what those find.
+    /// Spreads rays over the reflection and transmission lobes of a rough surface: several at the first hit of a path, one at
+    /// later hits.
     fn spread<G: ShadingPoint>(&mut self, point: &PathVertex<G>, crossing: &Crossing, lobe: Lobe) {
         let rays = if point.path.depth == 0 { self.context.gloss.rays } else { 1 };
         self.by_chance.get_mut(point.ray.sample as usize).into_iter().for_each(|by_chance| *by_chance = true);
-        // The same facets mirror and let through, so that nothing is lost between both.
+        // Reflection and transmission use the same facets, so that no energy is lost between them.
         let splits = self.splits(point);
         #[expect(clippy::cast_possible_truncation, reason = "a handful")]
         let points = if splits { rays.max(self.context.bands.len() as u32) } else { rays };
@@ -200,7 +202,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// Mirrors the `k`th ray off a facet.
+    /// Queues the `k`th ray, reflected off its facet.
     fn send_off_facet<G: ShadingPoint>(&mut self, point: &PathVertex<G>, crossing: &Crossing, rough: &Rough, k: u32) {
         let ShadingFrame { normal, geometric, view, .. } = point.surface.seen();
         let facet = rough.lobe.facet(view, rough.spread.point(k));
@@ -223,7 +225,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// Lets the `k`th ray through a facet.
+    /// Queues the `k`th ray, transmitted through its facet.
     fn send_through_facet<G: ShadingPoint>(
         &mut self,
         point: &PathVertex<G>,
@@ -241,7 +243,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
         let (n_i, n_t) = (f64::from(crossing.n_i), f64::from(crossing.n_t));
         let bent = if crossing.n_i == crossing.n_t {
-            // Thin: both walls together spread light as a mirror does, on the other side.
+            // Thin: the two walls together spread light as a mirror does, on the other side.
             let mirrored = reflect(-view, facet);
             Some(mirrored - normal * (2.0 * normal.dot(mirrored)))
         } else {
@@ -285,14 +287,14 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         self.starting[class as usize].push(ray, Path { cone_spread, scattered, ..path }, after);
     }
 
-    /// Queues what clear coat mirrors.
+    /// Queues the ray that the clear coat reflects.
     fn send_coat<G: ShadingPoint>(&mut self, point: &PathVertex<G>) {
         if let Some((coat, share)) = point.bsdf.coat_reflection() {
             self.send_reflected(point, coat, point.path.weight * share, point.path.band);
         }
     }
 
-    /// Queues what is mirrored by the surface and by clear coat over it: one ray where both have the same normal.
+    /// Queues the rays reflected by the surface and by its clear coat: one ray where both have the same normal.
     fn reflect<G: ShadingPoint>(&mut self, point: &PathVertex<G>, reflected: Vec3) {
         let (weight, normal, band) = (point.path.weight, point.surface.seen().normal, point.path.band);
         match point.bsdf.coat_reflection() {
@@ -306,7 +308,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// Whether a branch that begins here goes on, and with which weight.
+    /// Whether a new branch survives Russian roulette, which adjusts its weight.
     fn goes_on<G>(&self, point: &PathVertex<G>, path: &mut Path) -> bool {
         self.roulette.spin(&self.streams, point.ray.sample, path)
     }
@@ -336,7 +338,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             return;
         }
         let turn = band.map_or(0, |band| u32::from(band) + 1);
-        // Equal indices leave the ray as it is: the same ray goes on behind this hit.
+        // Equal indices do not bend the ray: the same ray goes on behind this hit.
         if crossing.n_i == crossing.n_t {
             let path = point.path.turned(RayClass::Refracted, turn);
             let mut path = Path { weight, band, depth: point.path.depth + 1, media: crossing.beyond, ..path };
@@ -348,7 +350,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let ShadingFrame { normal, geometric, view, .. } = point.surface.seen();
         let (n_i, n_t) = (f64::from(crossing.n_i), f64::from(crossing.n_t));
         let Some(bent) = refract(-view, normal, n_i, n_t) else {
-            // Total reflection by a hair that the bounce weights did not see.
+            // Total internal reflection, missed by rounding in the bounce weights.
             return self.send_reflected(point, normal, weight, band);
         };
         let dir = above(bent, -geometric);

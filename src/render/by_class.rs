@@ -1,22 +1,22 @@
-//! Values of the classes of rays.
+//! Values kept apart by ray class.
 
 use super::wave::RayClass;
 
-/// One value for each class of rays.
+/// One value for each ray class.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ByClass<T> {
-    /// From the eye.
+    /// Eye rays.
     pub primary: T,
-    /// To the lights.
+    /// Rays to the lights.
     pub shadow: T,
-    /// Reflected.
+    /// Reflected rays.
     pub reflected: T,
-    /// Refracted or passed through.
+    /// Rays that were refracted or passed through.
     pub refracted: T,
 }
 
 impl<T> ByClass<T> {
-    /// The values of all classes, in the order of the fields.
+    /// Returns the values of all classes, in the order of the fields.
     pub(crate) fn each_mut(&mut self) -> [&mut T; 4] {
         [&mut self.primary, &mut self.shadow, &mut self.reflected, &mut self.refracted]
     }

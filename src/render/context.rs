@@ -1,4 +1,4 @@
-//! What every ray of an image shares: the scene, its lights and sky in the centred frame, and the limits of the trees.
+//! What all rays of a picture share: the scene, its lights and sky in the centred frame, and the limits of the ray trees.
 
 use super::Settings;
 use super::ahead::Ahead;
@@ -24,18 +24,18 @@ use crate::scene::features::{Feature, Features};
 use crate::scene::{Background, Material, Scene};
 use std::sync::Arc;
 
-/// Rays to a panorama from each point by default.
+/// Default number of rays from each point to a panorama.
 const ENV_RAYS: u32 = 16;
 
-/// Shadow rays that wait before they are traced.
+/// Shadow rays that may be queued before they are traced.
 pub(super) const SHADOW_LIMIT: usize = 1 << 14;
-/// Rays to the surroundings that wait before they are traced.
+/// Environment rays that may be queued before they are traced.
 pub(super) const ENVIRONMENT_RAYS_LIMIT: usize = 1 << 15;
-/// Rays that follow primary rays and wait before they are traced.
+/// Secondary rays of primary rays that may be queued before they are traced.
 pub(super) const FOLLOWERS: usize = 1 << 17;
 
-/// Samples of a pixel that share the rays which one sample would send from each point: of stochastic sampling as many as
-/// every pixel has that is not even, for more rays come with more samples where they are needed.
+/// Number of samples of a pixel that share the rays which a single sample would send from each point. In stochastic sampling it
+/// is the number that every uneven pixel takes, because more samples, and so more rays, follow where needed.
 fn samples_together(settings: &Settings) -> u32 {
     match settings.sampling {
         Sampling::Stochastic(how) => {
@@ -46,7 +46,7 @@ fn samples_together(settings: &Settings) -> u32 {
     }
 }
 
-/// Shared by all workers, computed once per image. What takes long to compute is shared by copies.
+/// Data shared by all workers, computed once per picture. Expensive parts are behind `Arc`, so that clones share them.
 #[derive(Clone)]
 pub(crate) struct Context<'a> {
     pub scene: &'a Scene,
@@ -54,85 +54,87 @@ pub(crate) struct Context<'a> {
     pub textures: &'a TextureStore<'a>,
     pub sky: Arc<Sky>,
     pub lights: Vec<LocalLight>,
-    /// What is known of each material for all points of it; `None` where it takes more, or where each point must be
-    /// looked at.
+    /// Shading constants of each material that hold at all its points; `None` where they vary, or where each point must be
+    /// evaluated.
     pub material_constants: Arc<[Option<MaterialConstants>]>,
-    /// Parts of the spectrum; empty unless a material disperses light.
+    /// Bands of the spectrum; empty unless a material disperses light.
     pub bands: Vec<Band>,
-    /// Where rays find nothing for certain.
+    /// Regions that rays certainly cross without a hit.
     pub alpha_voids: Option<Arc<AlphaVoids<'a>>>,
-    /// Whether anything but opaque surfaces can stand before a light.
+    /// Whether anything but opaque surfaces can stand between a point and a light.
     pub has_filters: bool,
-    /// How strongly the insides of materials absorb light.
+    /// Absorption of light inside the materials.
     pub absorption: Absorption,
-    /// Whether the environment is what is seen behind the scene.
+    /// Whether the environment is the background of the scene.
     pub shows_environment: bool,
-    /// Rays that each point sends to its surroundings.
+    /// Rays from each point to its surroundings.
     pub env_rays: u32,
     /// Shadow rays to each area light; at least 1.
     pub light_rays: u32,
-    /// Rays that rough surfaces spread.
+    /// Number of rays that rough surfaces spread.
     pub gloss: Gloss,
-    /// Whether rays may be spread by chance.
+    /// Whether random choices may spread rays.
     pub meets_by_chance: bool,
-    /// What such rays were found to meet seldom, and far brighter than all else, if that was looked for.
+    /// Rare and far brighter features that spread rays were found to hit; `None` if they were not looked for.
     pub fireflies: Option<Arc<Fireflies>>,
-    /// Samples of all pixels that are traced before the picture, with which they start; 0: none.
+    /// Samples of every pixel that are traced before the picture, which starts with them; 0 for none.
     pub first_samples: u32,
-    /// The first samples of pixels, where they were traced ahead.
+    /// The first samples of all pixels, where they were traced ahead.
     pub ahead: Option<Arc<Ahead>>,
-    /// How far highlights are spread, in widths of a ray's cone.
+    /// Spread of highlights, in widths of a ray's cone.
     pub highlight_reach: f32,
-    /// For every random choice.
+    /// Seed of all random choices.
     pub seed: u64,
-    /// Whether nothing is seen but lights, and what shines by itself.
+    /// Whether only lights and emissive surfaces are visible.
     pub is_dark: bool,
-    /// Points that are shaded before what waits of their rays may be traced; a multiple of [`LANES`].
+    /// Points that are shaded before their queued rays may be traced; a multiple of [`LANES`].
     pub points_at_a_time: usize,
-    /// Whether the background may be seen through glass.
+    /// Whether the background may be visible through glass.
     pub lets_background_through: bool,
     /// Bounces after the eye ray.
     pub depth: u32,
-    /// Branches whose largest weight is below this end.
+    /// Branches end whose largest weight is below this value.
     pub cutoff: f32,
-    /// Whether what the scene does without is done all the same.
+    /// Whether work that the scene does not need is done all the same.
     pub no_prune: bool,
 }
 
-/// Which rough surfaces spread how many rays.
+/// Which rough surfaces spread rays, and how many.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Gloss {
     pub rays: u32,
-    /// How much narrower the part of a lobe that a ray stands for is than among the rays of its sample alone.
+    /// Width of the part of a lobe that one ray stands for, relative to its width if only the rays of its own sample covered the
+    /// lobe.
     pub width: f32,
-    /// Whether all do, or only what lets light through.
+    /// Whether all rough surfaces spread rays, or only those that transmit light.
     all: bool,
 }
 
 impl Gloss {
-    /// What is asked for; `None`: the default.
+    /// Gloss for the number of rays asked for; `None` for the default.
     pub(crate) fn new(asked: Option<u32>) -> Self {
-        /// Rays through frosted glass by default.
+        /// Default number of rays through frosted glass.
         const GLASS: u32 = 4;
         Self { rays: asked.unwrap_or(GLASS), width: 1.0, all: asked.is_some_and(|rays| rays > 0) }
     }
 
-    /// Glossy rays where pixels are sampled so: all samples that a pixel may have send rays, and together they cover the lobe.
+    /// Narrows the lobe part of each ray to the sampling of pixels: rays of all samples that a pixel may have cover the lobe
+    /// together.
     fn of_samples(self, settings: &Settings) -> Self {
         Self { width: sample_width(settings), ..self }
     }
 
-    /// The rays of one of so many samples that share them.
+    /// Divides the rays among `samples` samples.
     fn shared_by(self, samples: u32) -> Self {
         Self { rays: self.rays.div_ceil(samples), ..self }
     }
 
-    /// Whether a material spreads rays where it is rough.
+    /// Whether rough surfaces of a material spread rays.
     pub(crate) fn spreads(self, material: &Material) -> bool {
         self.all || self.rays > 0 && material.reflection.transmits()
     }
 
-    /// Whether it does, and is rough in some place.
+    /// Whether a material spreads rays and is rough anywhere.
     fn spreads_far(self, material: &Material) -> bool {
         self.spreads(material) && material.metal_rough().is_some_and(|m| m.roughness > 0.0 || m.anisotropy.is_some())
     }
@@ -194,11 +196,12 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The alpha filter of rays of a class with these cones; `None` in counted runs, and where passing gaps could change
-    /// the order of sums.
+    /// Returns the alpha filter of the rays of a class with these cones; `None` in counted runs, and where skipping gaps could
+    /// change the order of sums.
     ///
-    /// What a sample gathers is added in the order of its rays, which must not depend on where these pass gaps, and so on how
-    /// many wait: so they do where each of so many samples has one ray alone, or no more wait in the end than go together.
+    /// Contributions to a sample are summed in the order of its rays, which must not depend on which gaps rays skip, and so on
+    /// how many rays are queued. Rays may skip gaps where each sample has only one ray, or where the whole queue is traced at
+    /// once.
     pub(super) fn alpha_filter<'r, P: Observer>(
         &'r self,
         (class, samples): (RayClass, usize),
@@ -211,44 +214,44 @@ impl<'a> Context<'a> {
         Some(alpha_voids.filter(rays, cones))
     }
 
-    /// Whether shadow rays ask on their way what lets light through, and how much.
+    /// Whether shadow rays query which surfaces on their way transmit light, and how much.
     pub(super) fn asks_filters(&self) -> bool {
         self.has_filters && !self.no_prune
     }
 
-    /// This context with other random choices, and other samples.
+    /// Returns this context for other random choices and other samples.
     pub(super) fn resampled(&self, settings: &Settings) -> Self {
         let (highlight_reach, gloss) = (glint::reach(settings), self.gloss.of_samples(settings));
         Self { seed: settings.seed, highlight_reach, gloss, ahead: None, ..self.clone() }
     }
 
-    /// Whether rays to the hotspot end at this material: rays that pass it may go on another way, or many, and leave some light
-    /// behind by the angle at which they meet it.
+    /// Whether rays to the hotspot end at this material: transmitted rays may change direction or branch, and lose light
+    /// depending on their angle of incidence.
     pub(super) fn turns(&self, material: &Material) -> bool {
         material.reflection.transmits()
     }
 
-    /// A prim and its material.
+    /// A prim and the index of its material.
     pub(super) fn face(&self, prim: u32) -> (Prim<'_>, u32) {
         (self.world.prim(prim), self.world.material(self.scene, prim))
     }
 
-    /// Shadow rays to each area light after so many bounces: what mirrors show needs no more than a hint of soft edges.
+    /// Shadow rays to each area light after `depth` bounces: reflections need no more than a hint of soft edges.
     pub(crate) fn light_rays_at(&self, depth: u32) -> u32 {
         if depth == 0 { self.light_rays } else { self.light_rays.div_ceil(4) }
     }
 
-    /// Whether no formula tells what many points see of their surroundings.
+    /// Whether the light that many points receive from their surroundings has no closed form.
     pub(crate) fn environment_needs_points(&self) -> bool {
         self.sky.is_map() || self.env_rays > 0
     }
 
-    /// Whether a branch of this weight is worth its rays, where it is such a part of what was spread.
+    /// Whether a branch of this weight, which stands for a fraction `part` of the spread rays, is worth tracing.
     pub(crate) fn is_alive(&self, weight: Vec3, part: f32) -> bool {
         weight.max_element() >= self.cutoff_of(part)
     }
 
-    /// No branch of less weight is.
+    /// Weight below which every branch ends, whatever its part.
     pub(crate) fn least_cutoff(&self) -> f32 {
         self.cutoff_of(1.0 / self.gloss.rays.max(1) as f32)
     }
@@ -258,20 +261,20 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Ways in which directions to the surroundings are drawn, which are a panorama or not, from surfaces of which some are
-/// translucent or not, and rough mirrors or not.
+/// Number of strategies that sample directions to the surroundings, by whether these are a panorama, whether some surfaces are
+/// translucent, and whether some are glossy.
 fn environment_samplers(to_panorama: bool, translucent: bool, glossy: bool) -> u32 {
-    // To each side. What a lobe gathers is met in it alone, and so is the sun of a panorama by its own light.
+    // One for each side. A lobe is sampled only within itself, and so is the sun of a panorama by its own light.
     1 + u32::from(translucent) + if to_panorama { 2 } else { u32::from(glossy) }
 }
 
-/// Rays from each of so many samples to its surroundings, where each would send `rays` alone: at least one for each way in
-/// each of both halves, for one that is met by chance through another brings seldom and far too much.
+/// Rays to the surroundings from each of `together` samples, where a sample alone would send `rays`: at least one for each
+/// strategy in each half, because a ray of another strategy hits the strategy's target rarely and with far too much weight.
 fn shared_env_rays(rays: u32, together: u32, samplers: u32) -> u32 {
     if rays == 0 { 0 } else { rays.div_ceil(together).max(2 * samplers) }
 }
 
-/// As many points as send hardly more rays together than may wait.
+/// Number of points whose rays together hardly exceed the limits of the queues.
 fn points_at_a_time(lights: &[LocalLight], light_rays: u32, env_rays: u32, gloss: Gloss) -> usize {
     let rays = |light: &LocalLight| if light.is_area() { light_rays as usize } else { 1 };
     let to_lights: usize = lights.iter().filter(|light| light.shadows).map(rays).sum();
@@ -280,13 +283,13 @@ fn points_at_a_time(lights: &[LocalLight], light_rays: u32, env_rays: u32, gloss
     points.max(1).next_multiple_of(LANES)
 }
 
-/// Bounces that a scene needs: none without mirrors or glass, a few between mirrors, more where every object is entered
-/// and left.
+/// Number of bounces that a scene needs: none without mirrors or glass, a few between mirrors, more where objects are entered and
+/// left.
 fn auto_depth(features: &Features, rough_ones_mirror: bool, cutoff: f32) -> u32 {
-    /// Light that is reflected inside of glass as a whole loses nothing: in a thin wall paths are long, but they are few.
+    /// Total internal reflection loses no light: paths in a thin wall are long, but few.
     const GLASS: u32 = 256;
-    /// As all branches of a path together weigh no more than it, 1 ÷ cutoff of them go on at most; below this cutoff that
-    /// no longer holds their number down, which may double with each bounce.
+    /// All branches of a path together weigh no more than the path, so at most 1 ÷ cutoff of them go on; below this cutoff, that
+    /// no longer limits their number, which may double with each bounce.
     const BRANCHES_END: f32 = 1e-6;
     const BRANCHING_GLASS: u32 = 12;
     const MIRRORS: u32 = 5;

@@ -1,4 +1,4 @@
-//! What each pixel of a picture cost: counts and times by ray class.
+//! Cost of each pixel of a picture: counts and times by ray class.
 //!
 //! Counting and timing are passes of their own, so that the picture itself is rendered without either.
 
@@ -12,7 +12,7 @@ use crate::image::{Channel, Values};
 use crate::named::names;
 use std::time::Duration;
 
-/// What is told of each pixel, as a sum over its samples.
+/// What is measured at each pixel, as a sum over its samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Cost {
     /// Ray/prim tests (n_it).
@@ -21,33 +21,33 @@ pub enum Cost {
     Steps,
     /// Tests that the mailbox saved (n_mb).
     Mailbox,
-    /// Milliseconds. Unlike the counts they are noisy: another run gives others.
+    /// Milliseconds. Unlike the counts they are noisy: they differ from run to run.
     Ms,
 }
 
 names!(Cost, "cost", Tests => "tests", Steps => "steps", Mailbox => "mailbox", Ms => "ms");
 
-/// What the time of a pixel has beside the classes: everything that is not spent in the structure.
+/// Channel of a pixel's time outside the structure, beside those of the ray classes.
 const SHADING: &str = "shading";
 
-/// Timed passes: what disturbs a pixel in one of them does not show.
+/// Number of timed passes: the fastest counts, so that a disturbance of a pixel in one of them does not show.
 const TIMED: usize = 3;
 
-/// What the pixels of a picture cost.
+/// Costs of the pixels of a picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Costs {
-    /// For each cost that was asked for one channel by ray class, such as `tests.shadow`; `ms` has `ms.shading` too.
+    /// For each cost that was asked for, one channel per ray class, such as `tests.shadow`; `ms` has `ms.shading` too.
     channels: Vec<Channel>,
 }
 
 impl Costs {
-    /// The channels of a cost; none when it was not asked for.
+    /// Channels of a cost; none when it was not asked for.
     pub fn channels(&self, cost: Cost) -> impl Iterator<Item = &Channel> {
         let of = move |c: &&Channel| c.name.split_once('.').is_some_and(|(what, _)| what == cost.name());
         self.channels.iter().filter(of)
     }
 
-    /// The sum of a cost over all classes, for each pixel.
+    /// Sum of a cost over all classes, for each pixel.
     pub fn total(&self, cost: Cost) -> Vec<f64> {
         let mut total = Vec::new();
         for channel in self.channels(cost) {
@@ -71,11 +71,11 @@ impl Costs {
     }
 }
 
-/// Traces the picture again, as many samples in each pixel as [`super::Settings::samples`] says: once for all counts, three
-/// times for the times. The counts are exact and the same for every number of threads. `None` when cancelled.
+/// Traces the picture again, with [`super::Settings::samples`] samples in each pixel: once for all counts, three times for the
+/// times. The counts are exact and do not depend on the number of threads. `None` when cancelled.
 ///
-/// Times are those of one pixel after the other on each thread, by the clock, and of three passes the least: what a
-/// ray's walk takes is its class's, and all else is `ms.shading`.
+/// Times are wall-clock times, pixel after pixel on each thread, the least of three passes: the walk of a ray counts for its
+/// class, everything else is `ms.shading`.
 pub fn render_costs(job: &Job, wanted: &[Cost], progress: &dyn Progress) -> Option<Costs> {
     let mut costs = Costs::default();
     let (counting, timing) = (wanted.iter().any(|&c| c != Cost::Ms), wanted.contains(&Cost::Ms));
@@ -103,10 +103,10 @@ pub fn render_costs(job: &Job, wanted: &[Cost], progress: &dyn Progress) -> Opti
     Some(costs)
 }
 
-/// The progress of one of several passes over the picture, as a part of them all.
+/// Progress of one of several passes over the picture, reported as a part of all of them.
 struct Pass<'a> {
     all: &'a dyn Progress,
-    /// From 0.
+    /// Index of the pass, from 0.
     number: usize,
     passes: usize,
 }
@@ -121,7 +121,7 @@ impl Progress for Pass<'_> {
     }
 }
 
-/// Times of each pixel by class, and of its shading: those of the pass in which it took least.
+/// Times of each pixel by class, and of its shading, from the pass that took least time for the pixel.
 fn times<'p>(job: &Job, progress: impl Fn(usize) -> Pass<'p>) -> Option<Vec<[f32; 5]>> {
     let timed = |number| {
         let pixel = |classes: &mut ByClass<Clock>, _: usize| vec![milliseconds(classes)];
@@ -151,14 +151,14 @@ fn pass<P: Observer, T: Copy + Default + Send>(
     cost_tiles(&context, job.accel, job.view, &settings, progress, together, cost)
 }
 
-/// Tests, steps, tests saved.
+/// Tests, steps, tests saved by the mailbox.
 type PixelCounts = [u32; 3];
 
-/// Counts of the rays of each sample.
+/// Counts of each sample's rays.
 #[derive(Debug, Default)]
 struct SampleCounts {
     counts: Vec<PixelCounts>,
-    /// The sample whose ray is asked.
+    /// Sample whose ray is being traced.
     current: usize,
 }
 
@@ -169,7 +169,7 @@ impl SampleCounts {
         }
     }
 
-    /// Sums over so many samples each.
+    /// Sums the counts of each pixel, which has `samples` consecutive samples.
     fn by_pixel(&self, samples: usize) -> Vec<PixelCounts> {
         let sum = |a: PixelCounts, b: &PixelCounts| [0, 1, 2].map(|i| a[i].saturating_add(b[i]));
         self.counts.chunks(samples).map(|pixel| pixel.iter().fold([0; 3], sum)).collect()
@@ -204,7 +204,7 @@ impl Observer for SampleCounts {
     }
 }
 
-/// By class, and of everything else.
+/// Milliseconds of each class, and of everything else.
 #[expect(clippy::cast_possible_truncation, reason = "no clock is as exact as f32")]
 fn milliseconds(classes: &mut ByClass<Clock>) -> [f32; 5] {
     let all = classes.primary.began.map_or(Duration::ZERO, |began| began.elapsed());

@@ -1,4 +1,4 @@
-//! How much of a picture shows something, as rays spread over it tell.
+//! Fraction of a picture that shows the model, estimated by rays spread over the picture.
 
 use super::media::Media;
 use super::primary_rays::{Ball, CameraSample, Eye};
@@ -9,35 +9,35 @@ use crate::accel::{Accel, Hit, NoProbe, Ray};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Rays that are sent first.
+/// Number of rays in the first round.
 const FIRST: u32 = 1 << 10;
 
-/// Where no more than one of so many of them hits, there are as many as pixels.
+/// Unless more than one in this many rays of the first round hits, one ray per pixel is sent.
 const RARE: usize = 100;
 
-/// But no fewer and no more than these.
+/// Least and greatest number of rays then sent.
 const LEAST: u32 = 1 << 12;
 const MOST: u32 = 1 << 20;
 
-/// Rays that are sent together.
+/// Rays traced in one batch.
 const TOGETHER: u32 = 1 << 12;
 
-/// So much that is not there is looked through to find something that is.
+/// Most invisible layers that are looked through before the ray counts as seeing something.
 const LAYERS: usize = 64;
 
-/// What became of rays.
+/// Outcome of the rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Coverage {
-    /// So many were sent.
+    /// Number of rays sent.
     pub rays: usize,
-    /// And so many hit something, be it transparent.
+    /// Number of rays that hit something, even if it is transparent.
     pub hits: usize,
-    /// Whether one of them sees something: not only backs of one-sided faces and what is wholly transparent.
+    /// Whether any ray sees something: not only back faces of one-sided materials and fully transparent surfaces.
     pub shown: bool,
 }
 
-/// Sends rays through a picture, evenly spread but in no rows: models are framed in the middle, and thin ones would stand
-/// between two of them. They are not among the rays that are counted.
+/// Sends rays through a picture, evenly spread but not in rows: models are framed in the middle, and a thin one would stand
+/// between two rows. These rays are not counted among those of the picture.
 pub fn coverage(job: &Job) -> Coverage {
     let pixels = job.settings.width.saturating_mul(job.settings.height);
     let all = pixels.clamp(LEAST, MOST);
@@ -52,7 +52,7 @@ pub fn coverage(job: &Job) -> Coverage {
     both(first, others.reduce(|| Coverage { rays: 0, hits: 0, shown: false }, both))
 }
 
-/// What becomes of these rays.
+/// Sends the rays with these indices.
 fn sent(job: &Job, numbers: Range<u32>) -> Coverage {
     let Job { scene, world, accel, view, settings, .. } = *job;
     let (width, height) = (settings.width, settings.height);
@@ -88,12 +88,12 @@ fn sent(job: &Job, numbers: Range<u32>) -> Coverage {
     Coverage { rays: numbers.len(), hits: count, shown: shown || !met.0.is_empty() }
 }
 
-/// The rays that hit something, and what.
+/// Keeps the rays that hit something, with their hits.
 fn only_hits((rays, hits): (Vec<Ray>, Vec<Hit>)) -> (Vec<Ray>, Vec<Hit>) {
     rays.into_iter().zip(hits).filter(|(_, hit)| hit.is_some()).unzip()
 }
 
-/// Whether a ray sees what it hits.
+/// Whether the ray sees the surface that it hits.
 fn is_there(job: &Job, ray: &Ray, hit: &Hit) -> bool {
     let target = HitPrim::new(job.scene, job.world, hit.prim);
     let material = target.material;

@@ -1,15 +1,15 @@
-//! Numbers for random choices: the same in every run, for every structure and any number of threads.
+//! Numbers for random choices: the same in every run, with every structure and any number of threads.
 
 use super::sobol::{self, mix};
 use crate::accel::{Hit, Ray};
 use crate::math::random::Random;
 
-/// Steps of a sequence in the unit square that leaves no gaps: the inverse powers of the root of x³ = x + 1.
+/// Steps of an additive recurrence that fills the unit square evenly: the inverse powers of the root of x³ = x + 1.
 ///
 /// M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences" (2018).
 const STEPS: [f32; 2] = [0.754_877_7, 0.569_840_3];
 
-/// A sample's place among those of its pixel: the `index`th of a sequence that no other pixel has.
+/// Position of a sample among those of its pixel: index `index` in a sequence that belongs to this pixel alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Stream {
     pub key: u32,
@@ -22,22 +22,22 @@ pub(crate) struct Draws(From);
 
 #[derive(Clone, Debug)]
 enum From {
-    /// The hit alone.
+    /// Numbers decided by the hit alone.
     Hit(Random),
-    /// The sample's place among its pixel's, in dimensions that the kind of choice decides.
+    /// Numbers of the sample's position in its stream; the second field is the dimension, which depends on the purpose.
     Stream(Stream, u32),
 }
 
-/// Points that fill the unit square evenly.
+/// A set of points that fills the unit square evenly.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum SampleSet {
-    /// A lattice, moved as a whole.
+    /// A lattice, shifted as a whole.
     Moved([f32; 2]),
-    /// A part of a sequence that begins with this index.
+    /// A part of a sequence, from index `first`.
     Part { key: u32, first: u32 },
 }
 
-/// What random choices of one hit are for: each has numbers of its own.
+/// Purpose of a random choice at a hit: each has numbers of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
     Lights,
@@ -49,9 +49,9 @@ pub(crate) enum Purpose {
 }
 
 impl Draws {
-    /// The numbers of a hit. Where the sample has no place in a stream, nothing but the ray and where it ended decides
-    /// them: equal rays have equal numbers. Else they are the sample's members of sequences that all samples of its pixel
-    /// share, so that these together fill what they sample evenly; `branch` tells the hits of one sample's tree apart.
+    /// Returns the numbers of a hit. Without a stream for the sample, they depend only on the ray and its hit: equal rays get
+    /// equal numbers. Otherwise they are the sample's elements of sequences that all samples of its pixel share, so that these
+    /// together fill their domain evenly; `branch` tells the hits of one sample's ray tree apart.
     pub(crate) fn at(seed: u64, streams: &[Stream], branch: u32, ray: &Ray, hit: &Hit, purpose: Purpose) -> Self {
         if let Some(&stream) = streams.get(ray.sample as usize) {
             return Self::of(stream, branch, purpose);
@@ -62,12 +62,12 @@ impl Draws {
         Self(From::Hit(Random::new(mixed)))
     }
 
-    /// The numbers of a sample's place in its stream.
+    /// Returns the numbers of a sample's position in its stream.
     pub(crate) fn of(stream: Stream, branch: u32, purpose: Purpose) -> Self {
         Self(From::Stream(stream, mix(branch, purpose as u32)))
     }
 
-    /// A sequence that is independent of those taken before, for so many points.
+    /// Returns a set of `points` points, independent of those taken before.
     pub(crate) fn spread(&mut self, points: u32) -> SampleSet {
         match &mut self.0 {
             From::Hit(random) => SampleSet::Moved([random.unit(), random.unit()]),
@@ -80,7 +80,7 @@ impl Draws {
 }
 
 impl SampleSet {
-    /// Its `k`th point, both coordinates 0 ≤ x < 1.
+    /// The `k`th point of the set, both coordinates 0 ≤ x < 1.
     #[inline(always)]
     pub(crate) fn point(self, k: u32) -> [f32; 2] {
         match self {
@@ -90,7 +90,7 @@ impl SampleSet {
     }
 }
 
-/// Rounding must not reach 1.
+/// Rounds to f32, but never up to 1.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
 fn below_one(x: f64) -> f32 {

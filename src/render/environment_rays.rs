@@ -1,13 +1,12 @@
-//! How much of its surroundings a point sees: rays to where light comes from, and what is left where they are stopped.
+//! Occlusion of the surroundings of a point: rays towards their light, and the share of it that arrives.
 //!
-//! Without such rays the surroundings light every point as if nothing stood in their way, which a formula tells exactly.
-//! With them that light is weakened by what the rays find. The share that comes through is as right on average as the formula
-//! is: each half of a
-//! point's rays corrects what the other half makes of the formula (a control variate whose factor comes from independent
-//! rays), so that points in the open and points shut in show no noise at all. After E. Heitz, S. Hill, M. McGuire,
-//! "Combining Analytic Direct Illumination and Stochastic Shadows" (2018), without the bias of its ratio.
+//! Without such rays the surroundings light every point unoccluded, which has an exact closed form. With them that light is
+//! weakened by what the rays hit. The result is as unbiased as the closed form: each half of a point's rays corrects the closed
+//! form by a factor that the other half estimates (a control variate whose factor comes from independent rays), so that fully
+//! open and fully enclosed points show no noise at all. After E. Heitz, S. Hill, M. McGuire, "Combining Analytic Direct
+//! Illumination and Stochastic Shadows" (2018), without the bias of its ratio.
 //!
-//! Rays are drawn from the cosine around the normal, from the lobe of a rough mirror and from the light of a panorama,
+//! Directions are drawn from the cosine around the normal, from the lobe of a glossy surface and from the light of a panorama,
 //! weighted by the balance heuristic (E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997).
 
 use super::branch::ShadingPoint;
@@ -24,24 +23,24 @@ use crate::accel::{Accel, Ray};
 use crate::math::Vec3;
 use std::f32::consts::PI;
 
-/// Ways to draw a direction.
+/// Strategies that draw a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum DirectionSampler {
-    /// By the cosine from the normal.
+    /// Cosine-weighted around the normal.
     Cosine,
-    /// By the facets of a rough mirror of this α.
+    /// The GGX lobe of this α around the mirror direction.
     Lobe(f32),
-    /// By the light of the sky.
+    /// The light of the sky.
     Light,
-    /// By the cosine from the back of the normal, from where light is scattered through.
+    /// Cosine-weighted around the back of the normal, for translucent surfaces.
     Behind,
 }
 
-/// Points that wait for their rays. Buffers of one worker.
+/// Points whose environment rays are queued. Buffers of one worker.
 #[derive(Debug, Default)]
 pub(crate) struct EnvironmentRays {
     points: Vec<Point>,
-    /// What each ray brings if nothing is in the way: of each point first one half, then the other.
+    /// Light that each ray brings if unoccluded: the two halves of each point's rays, one after the other.
     shares: Vec<Vec3>,
     arrived: Vec<Vec3>,
     shadows: ShadowQueue,
@@ -50,23 +49,23 @@ pub(crate) struct EnvironmentRays {
 #[derive(Clone, Copy, Debug)]
 struct Point {
     sample: u32,
-    /// What it shows if nothing is in the way.
+    /// Light that the sample receives from the point if nothing is occluded.
     open: Vec3,
 }
 
-/// A point of a surface that looks around.
+/// A surface point that sends environment rays.
 pub(crate) struct EnvironmentPoint<'a, G> {
     pub surface: &'a G,
     pub bsdf: &'a Bsdf,
-    /// The ray that found it.
+    /// The ray that hit the point.
     pub ray: &'a Ray,
-    /// Numbers for the directions of its rays.
+    /// Random numbers for the directions of the point's rays.
     pub draws: Draws,
-    /// What its sample shows of it, of light of 1.
+    /// Throughput of the path up to the point.
     pub weight: Vec3,
-    /// What it shows of its surroundings if nothing is in the way, not weighted.
+    /// Light reflected from the unoccluded surroundings, not weighted by the throughput.
     pub open: Vec3,
-    /// What it is inside of, where that absorbs light.
+    /// Media that the point is inside of, where these absorb light.
     pub media: Option<Media>,
 }
 
@@ -77,18 +76,18 @@ impl EnvironmentRays {
         self.shadows.clear();
     }
 
-    /// Rays that wait.
+    /// Number of queued rays.
     pub(crate) fn len(&self) -> usize {
         self.shares.len()
     }
 
-    /// Sends `context.env_rays` rays, half of them each from numbers of its own.
+    /// Queues `context.env_rays` rays, each half from random numbers of its own.
     pub(crate) fn push<G: ShadingPoint>(&mut self, context: &Context, point: &EnvironmentPoint<G>) {
         let seen = point.surface.seen();
         let lobe = point.bsdf.gloss().map(|roughness| DirectionSampler::Lobe(roughness * roughness));
         let light = context.sky.is_map().then_some(DirectionSampler::Light);
         let behind = point.bsdf.is_translucent().then_some(DirectionSampler::Behind);
-        // The first ones get a ray where there are few; what lies behind is found in no other way.
+        // With few rays the first strategies get them; no other strategy finds what lies behind.
         let samplers = [Some(DirectionSampler::Cosine), behind, lobe, light];
         let count = 1 + u32::from(lobe.is_some()) + u32::from(light.is_some()) + u32::from(behind.is_some());
         let half = context.env_rays.div_ceil(2);
@@ -99,7 +98,7 @@ impl EnvironmentRays {
             for k in 0..half {
                 let sampler = samplers.iter().flatten().nth((k % count) as usize).unwrap_or(&DirectionSampler::Cosine);
                 let dir = sampler.draw(spread.point(k), &context.sky, &view);
-                // Normals and the face itself may not agree on the side.
+                // The shading normal and the face may disagree on the side.
                 let side =
                     if behind.is_some() && dir.dot(seen.normal) <= 0.0 { -seen.geometric } else { seen.geometric };
                 let (radiance, drawn) = context.sky.drawn(dir);
@@ -123,7 +122,7 @@ impl EnvironmentRays {
         self.points.push(Point { sample: point.ray.sample, open: point.open * point.weight });
     }
 
-    /// Traces all rays and hands what points show to `arrive`, as (sample, light) in an order that is always the same.
+    /// Traces all rays and passes the light of each point to `arrive` as (sample, light), always in the same order.
     pub(crate) fn trace<A: Accel, P: Observer>(
         &mut self,
         (context, media): (&Context, &mut MediaTable),
@@ -148,7 +147,7 @@ impl EnvironmentRays {
     }
 }
 
-/// What is left of `open` when rays were sent with these sums of light, for each half, and these came through.
+/// Estimates the visible part of `open` from the light that each half of the rays sent, and the light that came through.
 fn let_through(open: Vec3, sent: [Vec3; 2], come: [Vec3; 2]) -> Vec3 {
     let share = |i: usize| {
         let part = |come: f32, sent: f32| if sent > 0.0 { come / sent } else { 1.0 };
@@ -158,7 +157,7 @@ fn let_through(open: Vec3, sent: [Vec3; 2], come: [Vec3; 2]) -> Vec3 {
     corrected(0, 1) + corrected(1, 0)
 }
 
-/// The frame that directions are drawn in.
+/// Frame of the normal, and the view direction.
 struct View {
     normal: Vec3,
     tangent: Vec3,
@@ -191,7 +190,7 @@ impl DirectionSampler {
         }
     }
 
-    /// 1/sr; `light` is that of drawing by the light of the sky.
+    /// Probability density of `dir`, 1/sr; `light` is the density of drawing it by the light of the sky.
     fn density(self, dir: Vec3, light: f32, view: &View) -> f32 {
         match self {
             Self::Cosine => view.normal.dot(dir).max(0.0) / PI,
@@ -226,7 +225,7 @@ mod tests {
 
     #[test]
     fn what_comes_through_is_right_on_average_however_few_rays_there_are() {
-        // Of light spread by x over 0 … 1 (∫ 2x = 1) the part beyond 0.6 is hidden: 1 − 0.6² = 0.64 of it.
+        // Light with density 2x over 0 … 1, hidden beyond 0.6: 0.6² = 0.36 of it arrives.
         let mut random = Random::new(7);
         let mut half = || {
             let x = [random.unit(), random.unit()];

@@ -1,11 +1,11 @@
-//! Fireflies: samples far brighter than those beside them, since a ray that was spread by chance met something small.
+//! Fireflies: samples far brighter than their neighbours, because a randomly spread ray hit something small and bright.
 //!
-//! A lamp behind frosted glass, or far out of focus, is met by one sample of hundreds. Pixels whose first samples all miss it
-//! agree and look certain, and are darker than they should be by all that it adds. So one sample of a part of the pixels, or of a
-//! small picture some of each, is traced before the picture, and some more of those that show something bright. Where some of
-//! these are fireflies, pixels near them whose own samples are spread by chance are not certain before they have met one, too, or
-//! so many of their samples have not that it matters little. Where all pixels are asked, their samples are the first ones of the
-//! picture ([`Ahead`]).
+//! A lamp behind frosted glass, or far out of focus, is hit by one sample in hundreds. Pixels whose first samples all miss it
+//! agree, look certain, and are too dark by all that it adds. So before the picture, one sample of some pixels is traced, or in a
+//! small picture several of every pixel, and then more of the pixels that show something bright. Where some of these are
+//! fireflies, a pixel nearby whose own samples are spread by random choices is certain only once it has met one too, or so many
+//! of its samples have not that it hardly matters. Where every pixel takes part, the samples are the first ones of the picture
+//! ([`Ahead`]).
 
 use super::ahead::Ahead;
 use super::by_class::ByClass;
@@ -23,36 +23,37 @@ use super::{Job, Progress, Settings};
 use crate::accel::Accel;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Of a picture with more pixels than [`SMALL`] one in so many columns of one in so many rows is asked.
+/// In a picture of more than [`SMALL`] pixels, the search takes one pixel from each square of this many columns and rows.
 const STEP: u32 = 2;
-/// To foretell what a picture takes one in so many of these.
+/// A forecast of the rendering takes one in this many columns and rows of those.
 const HINT: u32 = 4;
 const SMALL: u64 = 1 << 16;
-/// Of fewer pixels each is asked for more samples until they are nearly as many, but for no more than so many.
+/// Most samples of each pixel of a smaller picture, which takes more until the search has nearly [`SMALL`] samples.
 const MOST: u32 = 16;
 
-/// Of a pixel that shows something bright so many more samples are taken, …
+/// Additional samples of a pixel that shows something bright.
 const AGAIN: u32 = 16;
-/// … and it is a firefly if no more of so many others show it: a pixel that shows it often will find out by itself.
+/// A bright sample is a firefly if at most this many of [`AGAIN`] others are as bright: a pixel that shows it more often finds
+/// out by itself.
 const SELDOM: usize = 2;
 
-/// What is this part as bright is nearly as bright.
+/// A light at least this fraction as bright counts as nearly as bright.
 const NEARLY: f32 = 0.25;
 
-/// So many pixels across are a cell.
+/// Width and height of a cell, pixels.
 const CELL: u32 = TILE;
-/// Fireflies are looked for so many cells away: what one of thousands of samples meets is then hardly overlooked.
+/// Distance in cells up to which fireflies are looked for: what one sample in thousands hits is then hardly missed.
 const REACH: usize = 2;
-/// Fewest pixels with fireflies that tell how many there are in a cell, in nine, and in all of these.
+/// Fewest pixels with fireflies from which their density is estimated in a cell, in 3 × 3 cells, and in 5 × 5 cells.
 const FEWEST: [u32; REACH + 1] = [4, 2, 1];
 
-/// What samples of some cells have shown that may have met something by chance.
+/// Sums over those samples of some cells that were spread by random choices.
 #[derive(Clone, Copy, Debug, Default)]
 struct Told {
     samples: u32,
-    /// The sum of their light, no more than white each.
+    /// Sum of their light, each clamped to white.
     light: f64,
-    /// Fireflies among them, the sum of their light, and how many pixels showed any.
+    /// Number of fireflies, the sum of their light, and the number of pixels that showed any.
     fireflies: u32,
     bright: f64,
     pixels: u32,
@@ -69,36 +70,36 @@ impl Told {
         }
     }
 
-    /// That part of a sum that each sample has.
+    /// Mean over the samples of a sum over them.
     #[expect(clippy::cast_possible_truncation, reason = "as exact as light is")]
     fn mean(&self, sum: f64) -> f32 {
         (sum / f64::from(self.samples.max(1))) as f32
     }
 }
 
-/// Where fireflies were met.
+/// Where fireflies were found.
 #[derive(Debug)]
 pub(super) struct Fireflies {
-    /// Cells in a row.
+    /// Number of cells in a row.
     columns: usize,
     cells: Vec<Cell>,
 }
 
-/// What is known of the fireflies in and around a cell.
+/// Fireflies in and around a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Cell {
-    /// How bright they are on average, after exposure; 0 where there are none that matter.
+    /// Mean brightness of the fireflies, after exposure; 0 where there are none that matter.
     brightness: f32,
-    /// How much too dark pixels are without those that do not matter, as they are written.
+    /// Amount by which pixels are too dark, as they are written, without the fireflies that do not matter.
     missed: f32,
 }
 
-/// A sample of a pixel that was asked.
+/// A sample that the search traced.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
-    /// Its greatest channel, after exposure.
+    /// Greatest channel of the sample, after exposure.
     light: f32,
-    /// Whether its rays were spread by chance.
+    /// Whether random choices spread its rays.
     by_chance: bool,
 }
 
@@ -110,26 +111,26 @@ fn pixels(width: u32, height: u32) -> u64 {
     u64::from(width) * u64::from(height)
 }
 
-/// Samples that each pixel that is asked is asked for, a power of two.
+/// Number of samples that the search takes of each of its pixels, a power of two.
 fn samples(width: u32, height: u32) -> u32 {
     let samples = SMALL / pixels(width, height).max(1);
     u32::try_from(samples).map_or(MOST, |samples| 1 << samples.clamp(1, MOST).ilog2())
 }
 
-/// The pixel, and what its sample shows.
+/// A pixel, and one of its samples.
 type Answer = ((u32, u32), Asked);
 
-/// How closely a picture is looked at.
+/// How densely the search covers a picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Closely {
-    /// Before it is rendered.
+    /// As before a rendering.
     All,
-    /// To foretell what that takes: one pixel of sixteen of those.
+    /// As for a forecast of a rendering: one pixel in sixteen of those.
     Hint,
 }
 
 impl Closely {
-    /// One in so many columns, and rows, is asked.
+    /// Returns the step in columns and rows between the pixels that are searched.
     fn step(self, width: u32, height: u32) -> u32 {
         let step = if pixels(width, height) > SMALL { STEP } else { 1 };
         match self {
@@ -138,7 +139,7 @@ impl Closely {
         }
     }
 
-    /// How many times the rays before a rendering are as many.
+    /// Returns how many times as many rays the search before a rendering takes.
     pub(super) fn part(self) -> u64 {
         match self {
             Self::All => 1,
@@ -147,24 +148,24 @@ impl Closely {
     }
 }
 
-/// Eye rays that looking took.
+/// Number of eye rays that the search took.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Rays {
     pub all: u64,
-    /// Those that are not of the picture.
+    /// Eye rays that are not part of the picture.
     pub beside: u64,
 }
 
-/// So many of the first samples of all pixels are asked for that they are the picture's own, if they are: `None` in large ones,
-/// and where an error of the whole picture is aimed at, of which several are rendered.
+/// Returns the number of first samples of every pixel that the search takes from the picture itself; `None` in large pictures,
+/// and where the aim is an error of the whole picture, of which several are rendered.
 fn of_picture(settings: &Settings, how: &Stochastic) -> Option<u32> {
     let (width, height) = (settings.width, settings.height);
     let are = how.target.is_none() && Closely::All.step(width, height) == 1;
     are.then(|| samples(width, height).min(how.powers().1))
 }
 
-/// Looks for them where pixels are sampled until they are certain and rays may be spread by chance, and tells the context; eye
-/// rays that it took, and the counts of all threads.
+/// Looks for fireflies where pixels are sampled until they are certain and rays may be spread by random choices, and stores them
+/// in the context. Returns the number of eye rays that it took, and the counts of all threads.
 pub(super) fn look<P: Observer>(
     job: &Job,
     context: &mut Context,
@@ -195,7 +196,7 @@ pub(super) fn look<P: Observer>(
         each_tile(context, accel, &tiles(width, height), &Quiet(progress), work);
     let all = finished.into_iter().sum();
     let mut rays = Rays { all, beside: all };
-    // After cancelling the picture is not wanted, either.
+    // After cancelling, the picture is not wanted either.
     if !complete {
         return (rays, counts);
     }
@@ -223,40 +224,40 @@ pub(super) fn look<P: Observer>(
     (rays, counts)
 }
 
-/// How much too dark all pixels of some cells may be, as they are written.
+/// Returns by how much all pixels of some cells may be too dark, as they are written.
 fn missed_at_most(how: &Stochastic) -> f32 {
-    /// Part of what a single pixel may be wrong by.
+    /// Fraction of the error allowed for a single pixel.
     const OF_PIXEL: f32 = 0.25;
-    /// And of the error of the whole picture, if that is what was asked for.
+    /// Fraction of the error allowed for the whole picture, if that is the aim.
     const OF_ALL: f32 = 0.5;
     how.target.map_or(OF_PIXEL * how.error, |all| OF_ALL * all)
 }
 
-/// A pixel whose sample may be a firefly, and how bright that is.
+/// A pixel with a sample that may be a firefly, and the brightness of that sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bright {
     pixel: (u32, u32),
     light: f32,
 }
 
-/// How pixels are asked.
+/// How the search samples pixels.
 struct Question<'a> {
     frame: &'a Frame<'a>,
     how: &'a Stochastic,
     step: u32,
-    /// So many of each pixel.
+    /// Number of samples of each pixel.
     samples: u32,
 }
 
 impl Question<'_> {
-    /// How bright a sample is, after exposure.
+    /// Brightness of a sample, after exposure.
     fn light(&self, sample: &Sample) -> f32 {
         let light = sample.radiance.max_element() * self.how.space.gain();
         if light.is_finite() { light } else { 0.0 }
     }
 
-    /// Asks one pixel of each square of `step` columns and rows of a tile; what their first samples say, their second ones, and
-    /// so on. They are kept if they are the picture's. `None` when cancelled.
+    /// Samples one pixel of each square of `step` columns and rows of a tile; returns the first samples of all pixels, then their
+    /// second ones, and so on. Samples of the picture itself are kept in `ahead`. `None` when cancelled.
     fn ask<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
@@ -279,8 +280,8 @@ impl Question<'_> {
         each.collect()
     }
 
-    /// Asks some pixels, of each of which bright samples are among those `asked` before, for more; the ones that they hardly
-    /// show again. `None` when cancelled.
+    /// Takes more samples of some pixels, given with those samples from `asked` that may be fireflies; returns the ones that are
+    /// rare among all samples of their pixel. `None` when cancelled.
     fn ask_again<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
@@ -308,13 +309,13 @@ impl Question<'_> {
     }
 }
 
-/// Whether hardly any of all samples of a pixel, of which this is one, is nearly as bright.
+/// Whether few of all samples of a pixel, `light` among them, are nearly as bright as `light`.
 fn is_rare(light: f32, all: &[f32]) -> bool {
     let (again, others) = (all.iter().filter(|other| **other >= NEARLY * light).count() - 1, all.len() - 1);
     again * AGAIN as usize <= SELDOM * others
 }
 
-/// The samples of one index of all pixels that were asked, row by row.
+/// The samples of one index of all pixels that are searched, row by row.
 #[derive(Clone)]
 struct Grid {
     columns: usize,
@@ -337,7 +338,7 @@ impl Grid {
         self.each[y * self.columns + x]
     }
 
-    /// The pixels whose samples may be fireflies.
+    /// Returns the pixels whose samples may be fireflies.
     fn bright(&self, step: u32) -> Vec<Bright> {
         let places = (0..self.rows).flat_map(|y| (0..self.columns).map(move |x| (x, y)));
         let bright = places.filter(|&(x, y)| self.is_bright(x, y)).map(|(x, y)| {
@@ -348,9 +349,9 @@ impl Grid {
         bright.collect()
     }
 
-    /// Whether a sample is brighter than white, and far brighter than all but a few of those beside it.
+    /// Whether a sample is brighter than white, and far brighter than all but a few of its neighbours.
     fn is_bright(&self, x: usize, y: usize) -> bool {
-        /// Less than so many beside it are no wide thing that is seen in each of some pixels.
+        /// No more nearly as bright samples than this: more are a wide source, which each of several pixels sees.
         const FEW: usize = 3;
         let Asked { light, by_chance } = self.at(x, y);
         let rows = y.saturating_sub(1)..(y + 2).min(self.rows);
@@ -358,12 +359,12 @@ impl Grid {
             let columns = x.saturating_sub(1)..(x + 2).min(self.columns);
             &self.each[y * self.columns..][columns]
         });
-        // It is one of them itself.
+        // The sample itself is among its neighbours.
         by_chance && light > 1.0 && near.filter(|other| other.light >= NEARLY * light).count() <= FEW
     }
 }
 
-/// What was asked of each cell of so many columns and rows of samples, of what may have met something by chance; and cells in a
+/// Sums the randomly spread samples over cells of `side` columns and rows of samples; returns the cells, and their number in a
 /// row.
 fn in_cells(asked: &[Grid], side: usize) -> (Vec<Told>, usize) {
     let cells = |of: usize| of.div_ceil(side);
@@ -383,15 +384,15 @@ fn in_cells(asked: &[Grid], side: usize) -> (Vec<Told>, usize) {
 }
 
 impl Fireflies {
-    /// These, in a picture of which the cells were told so much. They matter where without them pixels are too dark by more than
-    /// `most`: by how much, is told by how bright these are, and how much more light the fireflies bring on average.
+    /// Builds the map of the fireflies `each` in a picture whose cells have these sums. Fireflies matter where pixels are too
+    /// dark by more than `most` without them: `missing` gives that from the mean light and the mean light that the fireflies add.
     fn among(
         mut each: Vec<Bright>,
         (told, columns): &(Vec<Told>, usize),
         missing: impl Fn(f32, f32) -> f32,
         most: f32,
     ) -> Self {
-        // Threads answer in any order; sums have one.
+        // Threads answer in any order; the order of sums is fixed.
         each.sort_unstable_by(|one, other| (one.pixel.cmp(&other.pixel)).then(one.light.total_cmp(&other.light)));
         let (mut told, columns, rows) = (told.clone(), *columns, told.len() / (*columns).max(1));
         for of_pixel in each.chunk_by(|one, next| one.pixel == next.pixel) {
@@ -409,7 +410,7 @@ impl Fireflies {
             cells.fold(Told::default(), Told::with)
         };
         let cells = (0..told.len()).map(|i| {
-            // One in a cell may be the only one for many cells around.
+            // A firefly in a cell may be the only one within many cells.
             let known = (0..=REACH).map(|reach| (around(i, reach), FEWEST[reach]));
             let known = known.filter(|(told, fewest)| told.pixels >= *fewest).map(|(told, _)| told);
             let missed = known.map(|told| missing(told.mean(told.light), told.mean(told.bright))).fold(0.0, f32::max);
@@ -428,12 +429,12 @@ impl Fireflies {
         &self.cells[(y / CELL) as usize * self.columns + (x / CELL) as usize]
     }
 
-    /// How bright those are that a pixel may meet by chance; 0: none.
+    /// Brightness of the fireflies that a pixel may meet; 0: none.
     pub(super) fn at(&self, pixel: (u32, u32)) -> f32 {
         self.cell(pixel).brightness
     }
 
-    /// How much too dark a pixel is by those that it may meet by chance and does not wait for, as it is written.
+    /// Amount by which a pixel is too dark, as it is written, without the fireflies that it may meet but does not wait for.
     pub(super) fn missed_at(&self, pixel: (u32, u32)) -> f32 {
         self.cell(pixel).missed
     }
@@ -443,7 +444,7 @@ impl Fireflies {
 mod tests {
     use super::*;
 
-    /// Of 0.1 all over, and what is put where, met by chance.
+    /// Returns a grid of randomly spread samples of 0.1, except for those given in `bright`.
     fn grid(columns: usize, rows: usize, bright: &[(usize, usize, f32)]) -> Grid {
         let mut grid = Grid { columns, rows, each: vec![Asked { light: 0.1, by_chance: true }; columns * rows] };
         bright.iter().for_each(|&(x, y, light)| grid.each[y * columns + x].light = light);
@@ -482,7 +483,8 @@ mod tests {
     #[test]
     fn what_a_pixel_shows_again_and_again_is_no_firefly_however_many_of_its_samples_were_looked_at() {
         let all = |bright: usize, of: usize| (0..of).map(|k| if k < bright { 8.0 } else { 0.1 }).collect::<Vec<f32>>();
-        // One before and sixteen after, or sixteen and sixteen: it, and two of sixteen others, or three of thirty-one.
+        // One sample before and sixteen after, or sixteen and sixteen: the firefly, and two of sixteen others, or three of
+        // thirty-one.
         for (of, most) in [(17, 3), (32, 4)] {
             assert!(is_rare(8.0, &all(1, of)) && is_rare(30.0, &all(most, of)), "{of}");
             assert!(!is_rare(30.0, &all(most + 1, of)), "{of}");
@@ -510,7 +512,7 @@ mod tests {
             [0, 32, 64].map(|x| (found.at((x, 0)), found.missed_at((x, 0))))
         };
         let of = |fireflies: u32, least: f32| of_pixels(fireflies, 1, least);
-        // Of five cells in a row all are near the middle one, three next to it.
+        // In a row of five cells all lie within reach of the middle one, three next to it.
         let mean = |fireflies: f32, tiles: f32| fireflies * 10.0 / (256.0 * tiles);
         assert_eq!(of(1, 0.99 * mean(1.0, 5.0)), [(10.0, 0.0); 3], "anywhere");
         let missed = mean(4.0, 3.0);

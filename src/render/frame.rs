@@ -1,4 +1,4 @@
-//! What all pixels of a picture share, and how samples become a pixel.
+//! Data shared by all pixels of a picture, and the resolve from samples to a pixel.
 
 use super::Settings;
 use super::certainty;
@@ -16,31 +16,31 @@ use crate::math::simd::{Kernel, LANES, Level, Simd};
 use crate::math::{DVec3, Vec3};
 use crate::scene::Background;
 
-/// Levels of adaptive sampling beyond which rays get no sharper: what is finer in a texture would be seen by chance.
+/// Levels of adaptive sampling beyond which rays get no sharper: finer texture detail would be hit or missed by chance.
 const SHARPEST: u32 = 3;
 
-/// What all tiles share.
+/// Data shared by all tiles.
 pub(super) struct Frame<'a> {
     pub view: &'a View,
     pub settings: &'a Settings,
-    /// Where the samples of a pixel lie, when they lie at the same places in each.
+    /// Offsets of the samples of a pixel, where these are the same in every pixel.
     pub offsets: Vec<(f64, f64)>,
-    /// Sharpness of one sample relative to a pixel.
+    /// Footprint width of one sample relative to a pixel.
     sample_width: f32,
     scene: Ball,
-    /// What the eye is inside of, the innermost last.
+    /// Media that the eye is inside of, the innermost last.
     pub media: Vec<Medium>,
     pub background: Option<Vec3>,
-    /// Whether glass may stand before it.
+    /// Whether glass may stand before the background.
     pub has_veil: bool,
-    /// How many standard errors of a pixel its allowed error must be; found by a search, so once for all tiles.
+    /// How many standard errors of a pixel its allowed error must be; found by a search, therefore once for all tiles.
     pub standard_errors: f32,
 }
 
-/// Sharpness of one sample relative to a pixel.
+/// Footprint width of one sample relative to a pixel.
 #[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
 pub(super) fn sample_width(settings: &Settings) -> f32 {
-    // Where more samples come as they are needed a ray is as sharp as the most of them: what it blurs stays blurred.
+    // Where the number of samples varies, every ray is as sharp as at the largest number: what a ray blurs stays blurred.
     let samples = match settings.sampling {
         Sampling::Uniform => settings.samples.max(1) as f32,
         Sampling::Adaptive(how) => (4_u32 << (2 * how.levels.min(SHARPEST))) as f32,
@@ -63,14 +63,14 @@ impl<'a> Frame<'a> {
         Self { view, settings, offsets, sample_width, scene, media, background, has_veil, standard_errors }
     }
 
-    /// Where eye rays come from.
+    /// Returns the eye that eye rays start from.
     pub(super) fn eye(&self, center: DVec3) -> Eye<'_> {
         let Settings { width, height, lens, .. } = *self.settings;
         let Self { view, sample_width, scene, .. } = *self;
         Eye { view, width, height, center, sample_width, scene, lens }
     }
 
-    /// The places of the samples of a pixel when they are the same in each, but for the lens.
+    /// Samples of a pixel where their offsets are the same in every pixel; only their lens points differ.
     pub(super) fn places(&self, (x, y): (u32, u32)) -> impl Iterator<Item = CameraSample> {
         let (lens, key) = (self.settings.lens, pixel_key(self.settings.seed, (x, y)));
         (0..).zip(&self.offsets).map(move |(i, &(dx, dy))| {
@@ -80,12 +80,12 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// The `i`th point of a pixel's lens; its middle where it has no opening.
+/// The `i`th lens point of a pixel; the centre of a lens without an aperture.
 pub(super) fn on_lens(lens: Option<ThinLens>, key: u32, i: u32) -> [f64; 2] {
     lens.map_or([0.5; 2], |_| sobol::point(i, key))
 }
 
-/// What tells the numbers of pixels apart.
+/// Key of the random numbers of a pixel.
 #[expect(clippy::cast_possible_truncation, reason = "both halves are mixed in")]
 #[inline(always)]
 pub(super) fn pixel_key(seed: u64, (x, y): (u32, u32)) -> u32 {
@@ -117,18 +117,18 @@ impl Kernel for Keys<'_> {
     }
 }
 
-/// What samples have gathered together.
+/// Sum over samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Sum {
     pub radiance: Vec3,
     pub through: Vec3,
-    /// Samples through which nothing of the background shows.
+    /// Number of samples through which no background shows.
     pub solid: f32,
     pub weight: f32,
 }
 
 impl Sum {
-    /// A single sample.
+    /// The sum over a single sample.
     #[cfg(test)]
     pub(super) fn of(sample: &Sample) -> Self {
         Self { radiance: sample.radiance, through: sample.through, solid: solid(sample), weight: 1.0 }
@@ -141,7 +141,7 @@ impl Sum {
         self.weight += 1.0;
     }
 
-    /// This and another, so many times.
+    /// Adds `times` times another sum.
     #[inline(always)]
     pub(super) fn plus(self, other: Self, times: f32) -> Self {
         Self {
@@ -152,11 +152,11 @@ impl Sum {
         }
     }
 
-    /// A pixel from its samples: premultiplied RGBA, and its [`veil`](crate::image::Picture::veil).
+    /// Resolves the sum into a pixel: premultiplied RGBA, and its [`veil`](crate::image::Picture::veil).
     ///
-    /// Alpha is one minus the share of the background that shows through. Coloured glass lets it through by channels; there
-    /// is one alpha, so before a known background colour the least channel is left to it and what the others show more is the
-    /// veil, and without one it stands for their mean.
+    /// Alpha is one minus the share of the background that shows through. Coloured glass transmits a different share in each
+    /// channel, but there is one alpha: before a known background colour, alpha takes the least channel and the veil takes what
+    /// the other channels show more; without one, alpha takes the mean of the channels.
     #[inline(always)]
     pub(super) fn resolve(&self, background: Option<Vec3>) -> ([f32; 4], [f32; 4]) {
         let share = 1.0 / self.weight.max(f32::MIN_POSITIVE);
@@ -205,7 +205,7 @@ struct Resolve<'a> {
     to: &'a mut Vec<[f32; 4]>,
 }
 
-/// Numbers of a sample.
+/// Number of f32 components of a sample.
 const NUMBERS: usize = 6;
 
 impl Kernel for Resolve<'_> {
@@ -215,8 +215,8 @@ impl Kernel for Resolve<'_> {
     fn run<S: Simd>(self, s: S) {
         let Self { samples, per_pixel, background, to } = self;
         let numbers: &[f32] = bytemuck::cast_slice(samples);
-        // All numbers of a sample side by side, which makes one addition of each. What the lanes behind them add is another
-        // sample's and does not count.
+        // Loads all components of a sample as one vector, so that each sample takes one addition. The lanes behind them hold
+        // components of the next sample and are ignored.
         let mut first = 0;
         while first < samples.len() {
             let end = (first + per_pixel.max(1)).min(samples.len());
@@ -232,7 +232,7 @@ impl Kernel for Resolve<'_> {
                 sum = s.add(sum, s.load(&row));
             }
             let [r, g, b, x, y, z, ..] = s.store(sum);
-            // The veil is not asked for here.
+            // The veil is not needed here.
             let sum = Sum { radiance: Vec3::new(r, g, b), through: Vec3::new(x, y, z), solid: 0.0, weight };
             to.push(sum.resolve(background).0);
             first = end;

@@ -1,10 +1,10 @@
 //! Rays from rough surfaces to the hotspot of a panorama.
 //!
-//! Of the rays that a rough surface spreads few would meet a sun, each far too bright. So for each of them another is sent
-//! to where the hotspot is, with the light that facets turn from there to the viewer, and what is spread sees the rest of
-//! the sky (P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo Techniques for Direct Lighting Calculations", 1996). Facets
-//! that let light through bend it as in B. Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet Models for
-//! Refraction through Rough Surfaces" (2007).
+//! Few of the rays that a rough surface spreads would hit the sun, and each of these would be far too bright. So each spread ray
+//! is paired with one to the hotspot, weighted by the light that facets reflect from there to the viewer, and the spread ray sees
+//! the rest of the sky (P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo Techniques for Direct Lighting Calculations", 1996).
+//! Transmitting facets refract as in B. Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet Models for Refraction through
+//! Rough Surfaces" (2007).
 
 use super::branch::{PathVertex, Rough, ShadingPoint};
 use super::context::Context;
@@ -18,7 +18,7 @@ use super::whitted::Tracer;
 use crate::accel::Accel;
 use crate::math::Vec3;
 
-/// Of which rays that a surface spreads the hotspot was sampled by itself.
+/// Which of the rays that a surface spreads have had the hotspot sampled separately.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct HotspotSampled {
     pub mirrored: bool,
@@ -26,12 +26,12 @@ pub(super) struct HotspotSampled {
 }
 
 impl HotspotSampled {
-    /// Of those that go on in empty space, unless it is not the sky that they see there. Between the walls of glass they
-    /// are turned again before they leave it.
+    /// Selects rays that go on in empty space, unless they see something other than the sky there. Rays between the walls of
+    /// glass are refracted again before they leave it.
     fn of<G: ShadingPoint>(context: &Context, point: &PathVertex<G>, crossing: &Crossing, lobe: &Lobe) -> Self {
         let sees_background = point.path.straight && crossing.n_i == crossing.n_t && !context.shows_environment;
         match context.sky.hotspot() {
-            // What shows the whole sun or nothing of it needs no help.
+            // A lobe narrower than the sun shows all of it or nothing, and needs no help.
             Some(area) if lobe.solid_angle() > area => Self {
                 mirrored: point.path.media == Media::OUTSIDE,
                 through: crossing.beyond == Media::OUTSIDE && !sees_background,
@@ -42,7 +42,7 @@ impl HotspotSampled {
 }
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
-    /// Sends a ray to the hotspot for each that a surface spreads; of which of these that was done.
+    /// Pairs each ray that a surface spreads with one to the hotspot; returns for which kinds of rays that was done.
     pub(super) fn sample_hotspot<G: ShadingPoint>(
         &mut self,
         point: &PathVertex<G>,
@@ -51,7 +51,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     ) -> HotspotSampled {
         let context = self.context;
         let sampled = HotspotSampled::of(context, point, crossing, &rough.lobe);
-        // Where colours are bent apart each has facets of its own.
+        // Under dispersion each band has facets of its own.
         if sampled == HotspotSampled::default() || self.splits(point) {
             return HotspotSampled::default();
         }
@@ -72,7 +72,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             if light.is_finite() && context.sky.is_worth_a_ray(light, context.cutoff_of(point.path.part * part)) {
                 let media = if mirrors { point.path.media } else { crossing.beyond };
                 let media = context.absorption.is_some().then_some(media);
-                // Normals and the face itself may not agree on the side.
+                // The shading normal and the face may disagree on the side.
                 let (class, side) = if mirrors {
                     (RayClass::Reflected, seen.geometric)
                 } else {
@@ -86,7 +86,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 }
 
-/// What facets of a lobe mirror of light from a direction: a share, 1/sr.
+/// Share of light from `dir` that the facets of a lobe reflect to the view, 1/sr.
 fn mirrored<G: ShadingPoint>(point: &PathVertex<G>, crossing: &Crossing, lobe: &Lobe, dir: Vec3) -> Vec3 {
     let ShadingFrame { normal, view, .. } = point.surface.seen();
     from_both_sides(normal, dir, |dir| {
@@ -95,7 +95,7 @@ fn mirrored<G: ShadingPoint>(point: &PathVertex<G>, crossing: &Crossing, lobe: &
     })
 }
 
-/// What they let through.
+/// Share of light from `dir` that the facets transmit to the view, 1/sr.
 fn let_through<G: ShadingPoint>(point: &PathVertex<G>, crossing: &Crossing, lobe: &Lobe, dir: Vec3) -> Vec3 {
     let ShadingFrame { normal, view, .. } = point.surface.seen();
     from_both_sides(normal, dir, |dir| {
@@ -110,21 +110,21 @@ fn let_through<G: ShadingPoint>(point: &PathVertex<G>, crossing: &Crossing, lobe
     })
 }
 
-/// What facets turn to a direction, of which there are two kinds: what some would send to the wrong side of the surface is
-/// sent to the right one instead ([`above`]).
+/// Sums the two kinds of facets that send light to `dir`: light that a facet would send to the wrong side of the surface is sent
+/// to the right side instead ([`above`]).
 fn from_both_sides(normal: Vec3, dir: Vec3, turned_to: impl Fn(Vec3) -> Vec3) -> Vec3 {
     turned_to(dir) + turned_to(reflect(dir, normal))
 }
 
 impl Lobe {
-    /// The facet that mirrors a direction to the view, and how densely directions lie there, 1/sr.
+    /// The facet that reflects `dir` to the view, and the density of such directions, 1/sr.
     fn facet_to(&self, view: Vec3, dir: Vec3) -> Option<(Vec3, f32)> {
         let facet = (view + dir).try_normalize()?;
         (view.dot(facet) > 0.0 && self.is_on_front(facet)).then(|| (facet, self.density(view, facet)))
     }
 
-    /// The facet that bends the view to a direction on the other side, between media of these indices, and how densely directions
-    /// lie there, 1/sr.
+    /// The facet that refracts the view to `dir` on the other side, between media of these indices, and the density of such
+    /// directions, 1/sr.
     fn facet_through(&self, view: Vec3, dir: Vec3, (n_i, n_t): (f32, f32)) -> Option<(Vec3, f32)> {
         let facet = (view * n_i + dir * n_t).try_normalize()?;
         let facet = if self.is_on_front(facet) { facet } else { -facet };
@@ -132,7 +132,7 @@ impl Lobe {
         if near <= 0.0 || far >= 0.0 {
             return None;
         }
-        // Of facets, not of what they mirror.
+        // Density of facets, not of reflected directions.
         let facets = self.density(view, facet) * 4.0 * near;
         let across = n_i * near + n_t * far;
         Some((facet, facets * n_t * n_t * -far / (across * across)))
@@ -145,7 +145,7 @@ mod tests {
     use crate::render::optics::refract;
     use std::f32::consts::PI;
 
-    /// What part of drawn facets sends the view to within 8° of a direction, and what part should by their density.
+    /// Fraction of drawn facets that send the view to within 8° of a direction, and the fraction that their density predicts.
     fn within(
         lobe: &Lobe,
         view: Vec3,

@@ -1,4 +1,4 @@
-//! Which meshes are instanced, stored once as objects that stand in several places, and which are flattened.
+//! Chooses which meshes are instanced, that is stored once as objects with several places, and which are flattened.
 
 use crate::accel::instances::{Object, ObjectTransform};
 use crate::accel::{Cone, InstancedObjects};
@@ -7,7 +7,7 @@ use crate::named::names;
 use crate::scene::{Mesh, Scene};
 use rayon::prelude::*;
 
-/// What becomes of meshes with several instances. What rays hit is the same.
+/// How meshes with several instances are stored. Hits are the same either way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Instancing {
     /// Each mesh is stored once where that saves much memory.
@@ -21,24 +21,24 @@ pub enum Instancing {
 
 names!(Instancing, "way with instances", Auto => "auto", Keep => "keep", Flatten => "flatten");
 
-/// Triangles from which on a mesh is worth a tree of its own by default.
+/// Fewest triangles for which a mesh gets a tree of its own by default.
 const WORTH_A_TREE: usize = 64;
 
-/// Triangles that instancing must save: flattened, so many take 20 MB with the tree over them, and rays through one tree are
-/// sooner answered than through two.
+/// Fewest triangles that instancing must save: flattened, this many take 20 MB with the tree over them, and one tree is faster to
+/// trace than two.
 const WORTH_KEEPING: usize = 1 << 18;
 
-/// The objects of a scene, and where instances of them stand.
+/// The objects of a scene, and the places of their instances.
 pub(super) struct InstancePlan {
-    /// All objects, which stand nowhere yet.
+    /// All objects, not placed yet.
     pub instanced: InstancedObjects,
-    /// For each instance the index of its object and its place; `None`: it is flattened.
+    /// Index of the object and the place of each instance; `None`: it is flattened.
     pub places: Vec<Option<(u32, ObjectTransform)>>,
 }
 
 impl InstancePlan {
-    /// Chooses, and finds where instances stand; those that stand in no ordinary way are flattened all the same.
-    /// `opaque` tells of each mesh whether it stops light, `to_frame` moves an instance into the scene's frame.
+    /// Chooses the objects and places their instances; instances whose transform is unsuitable are flattened all the same.
+    /// `opaque` gives for each mesh whether it stops light, `to_frame` moves an instance into the scene's frame.
     pub(super) fn of(
         scene: &Scene,
         how: Instancing,
@@ -64,7 +64,7 @@ impl InstancePlan {
     }
 }
 
-/// The meshes that are instanced.
+/// Returns the meshes that are instanced.
 fn chosen(scene: &Scene, how: Instancing) -> Vec<usize> {
     let least = match how {
         Instancing::Auto => WORTH_A_TREE,
@@ -79,7 +79,7 @@ fn chosen(scene: &Scene, how: Instancing) -> Vec<usize> {
     if how == Instancing::Auto && saved < WORTH_KEEPING { Vec::new() } else { chosen }
 }
 
-/// Bytes of shapes as they are stored, instanced objects with them.
+/// Size of the shapes in memory, instanced objects included, in bytes.
 pub(super) fn bytes(shapes: &crate::accel::Shapes, instanced: &InstancedObjects) -> usize {
     size_of_val(&*shapes.vertices)
         + size_of_val(&*shapes.triangles)

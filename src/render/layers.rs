@@ -1,4 +1,4 @@
-//! What a picture tells besides its colours: albedo, normal, position, depth and ids of the first surface seen.
+//! Layers of a picture besides colour: albedo, normal, position, depth and ids of the first surface seen.
 
 use crate::accel::NO_PRIM;
 use crate::image::Layers;
@@ -9,18 +9,18 @@ use crate::math::{DVec3, Vec3};
 pub(crate) struct FirstSurface {
     albedo: Vec3,
     normal: Vec3,
-    /// World space.
+    /// In world space.
     position: DVec3,
     prim: u32,
     instance: u32,
 }
 
 impl FirstSurface {
-    /// Nothing was hit.
+    /// Marks "nothing was hit".
     pub(crate) const NONE: Self =
         Self { albedo: Vec3::ZERO, normal: Vec3::ZERO, position: DVec3::ZERO, prim: NO_PRIM, instance: NO_PRIM };
 
-    /// Of a prim of an instance: position and normal in a frame with this `center`, and the albedo.
+    /// First surface on a prim of an instance; position and normal are in a frame with this `center`.
     pub(crate) fn new(
         (prim, instance): (u32, u32),
         (position, normal): (Vec3, Vec3),
@@ -46,7 +46,7 @@ pub(crate) struct LayerPixel {
     instance: u32,
 }
 
-/// The first surfaces of the samples of a pixel, gathered one by one.
+/// Sum over the first surfaces of the samples of a pixel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LayerSum {
     albedo: Vec3,
@@ -71,7 +71,7 @@ impl LayerSum {
         }
     }
 
-    /// Depth counts from `eye` along the unit vector `forward`.
+    /// Returns the layers of the pixel; depth is measured from `eye` along the unit vector `forward`.
     #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "layers are f32")]
     pub(crate) fn pixel(&self, eye: DVec3, forward: DVec3) -> LayerPixel {
         let share = 1.0 / self.samples.max(1) as f32;
@@ -88,14 +88,14 @@ impl LayerSum {
 }
 
 impl LayerPixel {
-    /// From the samples of a pixel; depth counts from `eye` along the unit vector `forward`.
+    /// Layers of a pixel from its samples; depth is measured from `eye` along the unit vector `forward`.
     pub(crate) fn new(samples: &[FirstSurface], eye: DVec3, forward: DVec3) -> Self {
         let mut sum = LayerSum::default();
         samples.iter().for_each(|first| sum.add(first));
         sum.pixel(eye, forward)
     }
 
-    /// Writes this into pixel `i` of `layers`, whose arrays are all long enough.
+    /// Stores the pixel at index `i` of `layers`, whose arrays are all long enough.
     pub(crate) fn store(&self, layers: &mut Layers, i: usize) {
         layers.albedo[i] = self.albedo.to_array();
         layers.normal[i] = self.normal.to_array();

@@ -1,4 +1,4 @@
-//! What lobes over a surface lie on: clear coat that may have a normal map of its own, and a grain that runs along tangents.
+//! Frames of lobes over a surface: clear coat with a normal map of its own, and anisotropy along tangents.
 
 use super::patch::Patch;
 use super::surface::facing;
@@ -6,10 +6,10 @@ use super::texture::TextureStore;
 use crate::math::{Vec2, Vec3};
 use crate::scene::{TextureRef, UvTransform};
 
-/// A point of a surface as lobes over it ask for it: unit vectors in world space.
+/// A surface point as its lobes need it: unit vectors in world space.
 #[derive(Clone, Copy)]
 pub(crate) struct LobeFrame<'a> {
-    /// The part of the mesh around it.
+    /// The part of the mesh around the point.
     pub patch: Option<&'a Patch<'a>>,
     /// Normal before maps turn it, on the side that is seen as a whole.
     pub smooth: Vec3,
@@ -19,22 +19,22 @@ pub(crate) struct LobeFrame<'a> {
     pub geometric: Vec3,
     /// Normal for shading.
     pub normal: Vec3,
-    /// Back along the ray.
+    /// Direction back along the ray.
     pub view: Vec3,
 }
 
 impl LobeFrame<'_> {
-    /// The normal of clear coat with this normal map and its scale, to the side of the ray.
+    /// Normal of a clear coat with this normal map and scale, on the side of the ray.
     pub(crate) fn coat_normal(&self, map: Option<&TextureRef>, scale: f32, store: &TextureStore) -> Vec3 {
-        // Maps turn the mesh's own normal: tangents belong to that side.
+        // Maps turn the mesh's own normal, because tangents belong to that side.
         let turned = |patch: &Patch| patch.normal_mapped(self.smooth * self.side, map?, scale, store);
         let turned = self.patch.and_then(turned).map(|normal| normal * self.side);
         facing(turned.unwrap_or(self.smooth), self.geometric, self.view)
     }
 
-    /// Vectors on the surface for coordinates of a map: along and across; any two where nothing tells.
+    /// Tangent and bitangent for the uv coordinates of a map; an arbitrary orthonormal pair where the mesh has no coordinates.
     pub(crate) fn tangents(&self, map: Option<&TextureRef>) -> [Vec3; 2] {
-        /// Where tangents come from when no map says: the first set of coordinates.
+        /// Source of tangents without a map: the first uv set.
         const FIRST: TextureRef = TextureRef {
             texture: 0,
             uv_set: 0,

@@ -1,13 +1,13 @@
 //! Rays -> linear pixels: waves per tile, Whitted shading, lights and shadows, optics, pixel sampling.
 //!
-//! [`render`] cuts the picture into tiles (`tile`); one thread traces a tile's trees of rays in waves (`whitted`,
-//! `wave`): eye rays, then the shadow rays of what they hit (`shadow`), then reflected and refracted rays,
-//! generation by generation. A hit becomes a `surface` once, its material is evaluated in `shade`, and [`optics`]
-//! says where light goes from there. Points of opaque surfaces need no more than formulas, which are computed for many of
-//! them side by side (`shade_hits`, `shading_batch`).
+//! [`render`] cuts the picture into tiles (`tile`); one thread traces the ray trees of a tile in waves (`whitted`, `wave`): eye
+//! rays, then the shadow rays of their hits (`shadow`), then reflected and refracted rays, generation by generation. A hit
+//! becomes a `surface` once, its material is evaluated in `shade`, and [`optics`] gives the directions in which light goes on.
+//! Points of opaque surfaces need no more than closed formulas, which are computed for many points side by side (`shade_hits`,
+//! `shading_batch`).
 //!
-//! The pixels are the same bits for every structure and every number of threads: structures give equal hits, sums run
-//! in a fixed order within a tile, and transcendental functions are the crate's own.
+//! The pixels are the same bits for every structure and every number of threads: structures return equal hits, sums run in a
+//! fixed order within a tile, and transcendental functions are the crate's own.
 
 mod adaptive;
 mod ahead;
@@ -84,60 +84,60 @@ use context::Context;
 use fireflies::Closely;
 use observer::Observer;
 
-/// Classes of rays as they are typed and printed, in the order of counts.
+/// Names of the ray classes as they are typed and printed, in the order of counts.
 pub const CLASS_NAMES: [&str; 4] = ["primary", "shadow", "reflected", "refracted"];
 
 /// What to render and how well.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Columns.
+    /// Number of columns.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Samples a pixel of uniform sampling: a square number lies on a regular grid, another on a rank-1 lattice. What needs
-    /// a fixed number in every other kind of sampling, too (costs of pixels, recorded rays, single samples), takes these.
+    /// Samples a pixel in uniform sampling: a square number lies on a regular grid, any other on a rank-1 lattice. Tasks that
+    /// need a fixed number (costs of pixels, recorded rays, single samples) use it in every other kind of sampling, too.
     pub samples: u32,
-    /// Which rays a pixel gets.
+    /// How many rays each pixel gets, and where.
     pub sampling: Sampling,
-    /// The lens, if it has an opening.
+    /// The lens, if it has an aperture.
     pub lens: Option<ThinLens>,
     /// Bounces after the eye ray; `None`: chosen from the scene.
     pub depth: Option<u32>,
-    /// Branches whose weight (largest channel) falls below this end.
+    /// Branches end whose weight (largest channel) falls below this value.
     pub cutoff: f32,
-    /// Seed of every random stream.
+    /// Seed of all random streams.
     pub seed: u64,
-    /// Rays that each point sends to its surroundings, rounded up to an even number, to find what hides them; 0: nothing does.
-    /// `None`: 16 where the surroundings are a panorama, else 0.
+    /// Rays from each point to its surroundings, rounded up to an even number, to find their occlusion; 0: unoccluded. `None`: 16
+    /// where the surroundings are a panorama, else 0.
     pub env_rays: Option<u32>,
-    /// Shadow rays to each light that has an extent, from what is seen first; a quarter of them from what mirrors show.
+    /// Shadow rays to each area light from the first hit; a quarter of them from points seen in mirrors.
     pub light_rays: u32,
-    /// Rays that the first rough surface on a line of sight spreads over what it mirrors, and over what it lets through; 0: rough
-    /// surfaces see their surroundings blurred by a formula, and nothing else. `None`: 4 for what lets light through, else 0.
+    /// Rays that the first rough surface on a line of sight spreads over its reflection, and over its transmission; 0: rough
+    /// surfaces see only their surroundings, blurred by a closed formula. `None`: 4 for surfaces that transmit light, else 0.
     pub gloss_rays: Option<u32>,
-    /// Brightness factor of the built-in studio's walls as the background of the picture; what they light stays as it is.
+    /// Brightness factor of the built-in studio's walls as the background of the picture; the light from them stays as it is.
     pub walls: f32,
     /// Whether [`crate::image::Layers`] are wanted.
     pub layers: bool,
-    /// For measurements: shade points one by one, not in batches. The same bits, more slowly.
+    /// For measurements: shade points one by one instead of in batches. Same bits, slower.
     pub one_by_one: bool,
-    /// For measurements: run the code paths that the scene does not need, too, without effect (see [`no_prune`]). The world and
-    /// the textures of the [`Job`] must be such, too.
+    /// For measurements: also run the code paths that the scene does not need, without effect (see [`no_prune`]). The world and
+    /// the textures of the [`Job`] must be made likewise.
     pub no_prune: bool,
 }
 
 impl Settings {
-    /// Most columns, and rows.
+    /// Greatest number of columns, and of rows.
     pub const MOST_SIDE: u32 = 65_535;
-    /// Most samples a pixel of uniform sampling, and rays to lights, to surroundings and over rough surfaces.
+    /// Greatest number of samples a pixel in uniform sampling, and of rays to lights, to surroundings and over rough surfaces.
     pub const MOST_RAYS: u32 = 65_536;
 
-    /// Whether sizes and numbers of rays are within what the command line takes. Whether there is memory for the picture is
-    /// another matter: a pixel takes tens of bytes, of adaptive sampling some hundred.
+    /// Checks that sizes and numbers of rays are within the ranges of the command line. Whether there is memory for the picture
+    /// is another matter: a pixel takes tens of bytes, in adaptive sampling some hundred.
     ///
     /// # Errors
     ///
-    /// The first that is not.
+    /// The first number out of its range.
     pub fn validate(&self) -> Result<(), SettingsError> {
         let within = |name, value: u32, least: u32, most: u32| {
             (least..=most).contains(&value).then_some(()).ok_or(SettingsError { name, value, least, most })
@@ -150,7 +150,7 @@ impl Settings {
         within("gloss_rays", self.gloss_rays.unwrap_or(0), 0, Self::MOST_RAYS)
     }
 
-    /// Rays that the eye sends at least.
+    /// Fewest eye rays of a rendering.
     pub fn fewest_eye_rays(&self) -> u64 {
         let samples = match self.sampling {
             Sampling::Uniform => self.samples.max(1),
@@ -160,7 +160,7 @@ impl Settings {
         u64::from(self.width) * u64::from(self.height) * u64::from(samples)
     }
 
-    /// These settings with equally many samples in each pixel.
+    /// These settings with the same number of samples in each pixel.
     fn fixed(&self) -> Self {
         Self { sampling: Sampling::Uniform, ..self.clone() }
     }
@@ -188,7 +188,7 @@ impl Default for Settings {
     }
 }
 
-/// A number of [`Settings`] that is not within its range.
+/// A number of [`Settings`] that is out of its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{name} is {value}: it must be {least} to {most}")]
 pub struct SettingsError {
@@ -198,39 +198,39 @@ pub struct SettingsError {
     most: u32,
 }
 
-/// Counts of a counted run.
+/// Ray counts of a counted run.
 pub type ClassCounts = ByClass<RayCounts>;
 
-/// What to render, and with what.
+/// A scene, ready to be rendered, and the settings.
 #[derive(Clone, Copy)]
 pub struct Job<'a> {
     /// The scene as loaded.
     pub scene: &'a Scene,
     /// The scene, placed for tracing.
     pub world: &'a World,
-    /// The structure built over the world ([`World::structure`]).
+    /// Structure built over the world ([`World::structure`]).
     pub accel: &'a AnyAccel<'a>,
     /// The scene's textures.
     pub textures: &'a TextureStore<'a>,
-    /// The eye.
+    /// Eye, direction and lens.
     pub view: &'a View,
     /// Size and quality.
     pub settings: &'a Settings,
 }
 
-/// Hears how far rendering has come, and may end it. Called from all threads.
+/// Receives the progress of a rendering, and may cancel it. Called from all threads.
 pub trait Progress: Sync {
     /// `done` of `total` tiles are finished.
     fn tiles(&self, done: usize, total: usize);
-    /// Whether to stop; asked every few hundred rays.
+    /// Whether to stop; called every few hundred rays.
     fn cancelled(&self) -> bool;
-    /// It takes time to find out how many samples are needed; said again and again.
+    /// Finding out how many samples are needed takes time: called again and again meanwhile.
     fn plans(&self) {}
-    /// All tiles are rendered, from the first on; more than once where several renderings make the picture.
+    /// The rendering of all tiles begins; called more than once where several renderings make the picture.
     fn begins(&self) {}
 }
 
-/// Progress that nothing is told of and that never cancels.
+/// Progress that is ignored and never cancels.
 impl Progress for () {
     fn tiles(&self, _done: usize, _total: usize) {}
     fn cancelled(&self) -> bool {
@@ -238,14 +238,14 @@ impl Progress for () {
     }
 }
 
-/// What came of a [`Job`].
+/// Result of a [`Job`].
 #[derive(Clone, Debug)]
 pub struct Rendered {
     /// The picture; tiles that were not finished are transparent black.
     pub picture: Picture,
-    /// Zero unless counted.
+    /// Ray counts; zero unless counted.
     pub counts: ClassCounts,
-    /// How many rays pixels got, and how certain they are.
+    /// Numbers of rays of the pixels, and their errors.
     pub sampled: Sampled,
     /// The maximum depth used.
     pub depth: u32,
@@ -263,7 +263,7 @@ pub fn render(job: &Job, progress: &dyn Progress) -> Rendered {
     render_with::<NoProbe>(job, progress, || {}).0
 }
 
-/// Renders and counts; slower, same pixels.
+/// Renders and counts; slower, but the same pixels.
 pub fn render_counted(job: &Job, progress: &dyn Progress) -> Rendered {
     let (mut rendered, counts) = render_with::<RayCounts>(job, progress, || {});
     for mut more in counts {
@@ -273,8 +273,8 @@ pub fn render_counted(job: &Job, progress: &dyn Progress) -> Rendered {
     rendered
 }
 
-/// Renders on one thread, as many samples in each pixel as [`Settings::samples`] says, and keeps the rays: of each class at
-/// most [`Tape::LIMIT`] for each question. `None` when a thread cannot be started or the rendering was cancelled.
+/// Renders on one thread with [`Settings::samples`] samples in each pixel, and keeps the rays: at most [`Tape::LIMIT`] of each
+/// class for each question. `None` when a thread cannot be started or the rendering was cancelled.
 pub fn render_recorded(job: &Job, progress: &dyn Progress) -> Option<(Rendered, Recording)> {
     let job = &Job { settings: &job.settings.fixed(), ..*job };
     // One thread takes the tiles in order, so that the rays come in the same order in every run.
@@ -286,10 +286,10 @@ pub fn render_recorded(job: &Job, progress: &dyn Progress) -> Option<(Rendered, 
     Some((rendered, recording))
 }
 
-/// The rays of a rendering; the `sample` of each is its pixel, counted row by row.
+/// Rays of a rendering; the `sample` of each is its pixel, counted row by row.
 pub type Recording = ByClass<Tape>;
 
-/// Renders, and tells `prepared` when what is computed once for an image is done and tiles begin.
+/// Renders; calls `prepared` between the work done once per picture and the tiles.
 fn render_with<P: Observer>(
     job: &Job,
     progress: &dyn Progress,

@@ -1,17 +1,18 @@
-//! Rendering with every code path on: what a scene does without is done all the same, and what comes of it thrown away.
+//! Rendering with every code path on: work that a scene does not need is done all the same, and its results are discarded.
 //!
-//! The picture stays what it is, bit for bit; what leaving things out saves is the difference in time. Done in vain are:
+//! The picture stays the same, bit for bit; the difference in time is what pruning saves. Done in vain are:
 //!
-//! - for each shadow ray: no prim counts as opaque, so that none ends the ray, and each that it meets is asked what it lets
-//!   through ([`World::without_pruning`](super::World::without_pruning));
-//! - at each point: the lookup of every map that its material lacks, in a map of the program's own
+//! - for each shadow ray: no prim counts as opaque, so that none ends the ray, and each prim that it hits is queried for its
+//!   transmittance ([`World::without_pruning`](super::World::without_pruning));
+//! - at each point: the lookup of every map that its material lacks, in a built-in map
 //!   ([`TextureStore::without_pruning`](super::texture::TextureStore::without_pruning)), with normal and bump mapping;
-//! - at each point: what is absorbed on the way to it, by materials that absorb nothing;
-//! - at each point where rays end: the weights of what is reflected and refracted, and its spectrum.
+//! - at each point: the absorption on the way to it, by materials that absorb nothing;
+//! - at each point where rays end: the weights of reflection and refraction, and their spectrum.
 //!
-//! Points are shaded one by one, since what is shaded side by side has no such code.
+//! Points are shaded one by one, because the batches have no such code.
 //!
-//! Grain, film, sheen, clear coat and what is scattered through are not: a material has them, or there is nothing to be done.
+//! Anisotropy, iridescence, sheen, clear coat and diffuse transmission are left out: a material without them has no work to do
+//! for them.
 
 use super::surface::Surface;
 use super::texture::{ColorSpace, STAND_IN, TextureStore};
@@ -20,10 +21,10 @@ use crate::scene::{Bitmap, Material, Pixels, Reflection, TextureRef, UvTransform
 use std::hint::black_box;
 use std::sync::LazyLock;
 
-/// A material that has the bump map others lack.
+/// A material with a bump map, for materials that lack one.
 static BUMPED: LazyLock<Material> = LazyLock::new(|| Material { bump_map: Some(stand_in()), ..Material::default() });
 
-/// A map that is grey everywhere, as large as maps of small files are.
+/// A uniformly grey map, as large as maps of small files are.
 pub(super) static GREY: LazyLock<Bitmap> = LazyLock::new(|| Bitmap {
     name: String::new(),
     width: 256,
@@ -39,7 +40,7 @@ const fn stand_in() -> TextureRef {
     }
 }
 
-/// Looks up every map that the material at a point lacks, and turns the normal by those that would.
+/// Looks up every map that the material at a point lacks, and perturbs the normal by the normal and bump maps.
 #[cold]
 pub(super) fn look_up_in_vain(surface: &Surface, store: &TextureStore) {
     let (Some(patch), material) = (&surface.patch, surface.target.material) else {

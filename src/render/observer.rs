@@ -1,38 +1,38 @@
-//! Who hears what the renderer asks: counting needs nothing but the walk's own calls, recording keeps the rays.
+//! Observers of the renderer's queries: counting needs only the calls of the walk itself, recording keeps the rays.
 
 use crate::accel::{Hit, NoProbe, Probe, Ray, RayCounts};
 
-/// What is asked about a ray.
+/// Kinds of queries for a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Question {
-    /// Its first hit.
+    /// The first hit of the ray.
     Closest,
-    /// Whether anything in its way stops light where it is hit. [`Filters`](super::Filters) know of what is not opaque.
+    /// Whether anything on the ray stops light where it is hit. [`Filters`](super::Filters) decide about prims that are not
+    /// opaque.
     Occluded,
-    /// Its first hit behind another.
+    /// The first hit of the ray behind another hit.
     Next,
 }
 
 impl Question {
-    /// Every question.
+    /// All questions.
     pub const ALL: [Self; 3] = [Self::Closest, Self::Occluded, Self::Next];
 }
 
-/// A probe that hears of whole slices of rays before they are asked. Nothing by default, and nothing in the machine code
-/// then.
+/// A probe that also sees whole slices of rays before their queries. By default the calls do nothing and compile to nothing.
 pub(crate) trait Observer: Probe {
-    /// Rays asked at once at most: enough for packets, few enough for brute force over a large scene to stop within a
-    /// second. 1 where the walk's calls must be told apart by ray.
+    /// Most rays per query: enough for packets, few enough for brute force over a large scene to stop within a second. 1 where
+    /// the calls of the walk must be attributed to single rays.
     const SLICE: usize = 256;
 
-    /// Whether rays may pass known gaps without telling: where queries are neither counted nor recorded.
+    /// Whether rays may skip known gaps unobserved: true where queries are neither counted nor recorded.
     const FILTERS_ALPHA: bool = false;
 
-    /// These rays are asked now; `after` has the hit of each behind which it goes on, where that is the question.
+    /// Called before a query of these rays; for [`Question::Next`], `after` has the hit behind which each goes on.
     fn asked(&mut self, _question: Question, _rays: &[Ray], _after: &[Hit]) {}
-    /// The rays asked last have their answers: these hits, where hits were asked for.
+    /// Called after the query of these rays, with their hits if it was for hits.
     fn answered(&mut self, _hits: &[Hit]) {}
-    /// So many samples of other pixels begin; sample numbers start from 0 again.
+    /// Called when a batch of `_samples` samples of other pixels begins; sample indices start from 0 again.
     fn batch(&mut self, _samples: usize) {}
 }
 
@@ -47,44 +47,44 @@ impl Observer for RayCounts {}
 pub struct Asked {
     /// The ray.
     pub ray: Ray,
-    /// What it has passed last.
+    /// The last hit that the ray has passed.
     pub after: Hit,
     batch: u32,
 }
 
-/// An even sample of the rays of one class.
+/// An evenly spaced sample of the rays of one class.
 #[derive(Clone, Debug, Default)]
 pub struct Tape {
     tracks: [Track; 3],
     batch: u32,
 }
 
-/// Rays of one question.
+/// The rays of one question.
 #[derive(Clone, Debug, Default)]
 struct Track {
     rays: Vec<Asked>,
-    /// Asked in all.
+    /// Number of rays that were asked.
     total: u64,
-    /// One in 2^`shift` is kept.
+    /// One ray in 2^`shift` is kept.
     shift: u32,
 }
 
 impl Tape {
-    /// Rays that are kept for a question at most. Beyond it every second one is dropped, so that what is left is always
-    /// an even sample, and at least half of this.
+    /// Most rays that are kept for a question. Beyond it every second one is dropped, so that the rest is always an evenly spaced
+    /// sample, at least half as large.
     pub const LIMIT: usize = 1 << 20;
 
-    /// The rays that were kept, in the order they were asked.
+    /// Returns the rays that were kept, in the order of their queries.
     pub fn rays(&self, question: Question) -> &[Asked] {
         &self.tracks[question as usize].rays
     }
 
-    /// How many rays were asked.
+    /// Returns the number of rays that were asked.
     pub fn total(&self, question: Question) -> u64 {
         self.tracks[question as usize].total
     }
 
-    /// Replaces sample numbers by pixels; `batches` has the pixels of the samples of each batch.
+    /// Replaces sample indices by pixels; `batches` has the pixel of each sample of each batch.
     pub(super) fn name_pixels(&mut self, batches: &[Vec<u32>]) {
         for asked in self.tracks.iter_mut().flat_map(|t| &mut t.rays) {
             let batch = batches.get((asked.batch as usize).saturating_sub(1));

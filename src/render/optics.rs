@@ -1,12 +1,12 @@
-//! What light does at a smooth boundary: reflect, refract, how much of each, and how the index depends on the wavelength.
+//! Optics of a smooth boundary: reflection, refraction, the share of each, and the index as a function of the wavelength.
 //!
-//! Pure functions of directions and indices of refraction; which surface they belong to is the caller's business.
-//! Indices by name are in [`crate::scene::ior`]. Directions are unit vectors along the ray; `normal` is a unit vector
-//! turned against the incident direction.
+//! Pure functions of directions and indices of refraction; they know nothing of surfaces. Indices by name are in
+//! [`crate::scene::ior`]. Directions are unit vectors along the ray; `normal` is a unit vector turned against the incident
+//! direction.
 
 use crate::math::{DVec3, Vec3};
 
-/// Mirror direction R = I − 2 (I·N) N; either side of the normal will do.
+/// Mirror direction R = I − 2 (I·N) N; the side of the normal does not matter.
 #[inline(always)]
 pub fn reflect(incident: Vec3, normal: Vec3) -> Vec3 {
     incident - 2.0 * incident.dot(normal) * normal
@@ -20,7 +20,7 @@ pub fn refract(incident: Vec3, normal: Vec3, n_i: f64, n_t: f64) -> Option<Vec3>
     let (i, n) = (unit(incident)?, unit(normal)?);
     let eta = n_i / n_t;
     let sin_t = eta * i.cross(n).length();
-    // At equality the refracted ray would run in the surface and carry nothing: total reflection as well.
+    // At equality the refracted ray would run in the surface and carry no energy: total reflection as well.
     if sin_t >= 1.0 {
         return None;
     }
@@ -44,8 +44,8 @@ pub fn fresnel_dielectric(cos_i: f64, n_i: f64, n_t: f64) -> f64 {
     0.5 * (across * across + along * along)
 }
 
-/// Schlick's approximation, "An Inexpensive BRDF Model for Physically-based Rendering" (1994), with its value at
-/// grazing angles given.
+/// Schlick's approximation of the Fresnel reflectance, "An Inexpensive BRDF Model for Physically-based Rendering" (1994), with a
+/// given value at grazing angles.
 #[inline(always)]
 pub fn fresnel_schlick(f0: Vec3, f90: f32, cosine: f32) -> Vec3 {
     let m = (1.0 - cosine).clamp(0.0, 1.0);
@@ -53,20 +53,20 @@ pub fn fresnel_schlick(f0: Vec3, f90: f32, cosine: f32) -> Vec3 {
     f0 + (Vec3::splat(f90) - f0) * (m2 * m2 * m)
 }
 
-/// The share of light that is left after `length` of what absorbs it with this coefficient, 1 / unit of length: Beer's law.
+/// Share of light left after `length` in a medium with this absorption coefficient, 1 / unit of length: Beer's law.
 #[inline(always)]
 pub fn transmittance(absorption: Vec3, length: f32) -> Vec3 {
     let left = |coefficient: f32| libm::expf(-coefficient * length.max(0.0));
     Vec3::new(left(absorption.x), left(absorption.y), left(absorption.z))
 }
 
-/// The smallest angle of incidence, radians, that reflects totally; `None` when the second medium is not the thinner.
+/// Smallest angle of incidence, radians, with total reflection; `None` unless the second medium is the optically thinner one.
 pub fn critical_angle(n_i: f64, n_t: f64) -> Option<f64> {
     (n_t < n_i).then(|| libm::asin(n_t / n_i))
 }
 
-/// The index at a wavelength in nanometres: Cauchy's equation through `n_d` with the Abbe number 20 / `dispersion`, as
-/// KHR_materials_dispersion fixes its constants; at least 1.
+/// Refractive index at a wavelength in nanometres: Cauchy's equation through `n_d` with the Abbe number 20 / `dispersion`, with
+/// the constants of KHR_materials_dispersion; at least 1.
 pub fn dispersed_index(n_d: f64, dispersion: f64, wavelength: f64) -> f64 {
     (n_d + (n_d - 1.0) * dispersion / 20.0 * (523_655.0 / (wavelength * wavelength) - 1.5168)).max(1.0)
 }
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
     use crate::scene::ior::by_name;
 
-    /// A ray that comes down at `degrees` from the normal +z.
+    /// Returns a ray that comes down at `degrees` from the normal +z.
     fn incoming(degrees: f64) -> Vec3 {
         let a = degrees.to_radians();
         DVec3::new(libm::sin(a), 0.0, -libm::cos(a)).as_vec3()
@@ -145,7 +145,7 @@ mod tests {
     fn fresnel_has_its_textbook_values() {
         assert!((fresnel_dielectric(1.0, 1.0, 1.5) - 0.04).abs() < 1e-15);
         assert!((fresnel_dielectric(0.0, 1.0, 1.5) - 1.0).abs() < 1e-15);
-        // At Brewster's angle half of what is reflected across the plane of incidence remains.
+        // At Brewster's angle only the polarisation across the plane of incidence is reflected: half of its reflectance remains.
         let brewster = libm::atan(1.5);
         let across = (1.0f64 - 2.25) / (1.0 + 2.25);
         assert!((fresnel_dielectric(libm::cos(brewster), 1.0, 1.5) - 0.5 * across * across).abs() < 1e-14);
@@ -176,8 +176,8 @@ mod tests {
         assert_eq!(dispersed_index(1.5, 0.0, 400.0), 1.5);
     }
 
-    /// Angle in degrees from the point opposite the sun at which light leaves a drop that it entered at `impact` radii from
-    /// the middle: refracted, reflected inside, refracted.
+    /// Angle in degrees from the antisolar point at which light leaves a drop that it entered at `impact` radii from the middle:
+    /// refracted, reflected inside, refracted.
     fn rainbow_angle(impact: f32, n_air: f64, n_drop: f64) -> Option<f64> {
         let sunlight = Vec3::NEG_Z;
         let entry = Vec3::new(impact, 0.0, (1.0 - impact * impact).sqrt());
@@ -198,7 +198,7 @@ mod tests {
             let angles = (1..2000).filter_map(|i| rainbow_angle(i as f32 / 2000.0, air, n));
             angles.fold(0.0, f64::max)
         };
-        // R. Descartes, 1637: the light gathers where the angle 4 θt − 2 θi is stationary, at cos² θi = (n² − 1) / 3.
+        // R. Descartes, 1637: light concentrates where the angle 4 θt − 2 θi is stationary, at cos² θi = (n² − 1) / 3.
         let stationary = |n: f64| {
             let ratio = n / air;
             let theta_i = libm::acos(((ratio * ratio - 1.0) / 3.0).sqrt());
@@ -212,7 +212,7 @@ mod tests {
         assert!((1.0..2.5).contains(&(brightest(red) - brightest(violet))), "{}", brightest(violet));
     }
 
-    /// S11 (drop): a million parallel rays that meet the drop evenly, for each of two wavelengths.
+    /// S11 (drop): a million parallel rays, spread evenly over the drop, for each of two wavelengths.
     #[test]
     fn the_light_of_a_drop_gathers_at_the_angles_of_the_primary_bow() {
         const RAYS: u32 = 1_000_000;
@@ -220,7 +220,7 @@ mod tests {
         for (n, angle) in [(1.331, 42.4), (1.344, 40.5)] {
             let mut found = [0u32; 900];
             for i in 0..RAYS {
-                // As many rays cross each part of the disc.
+                // Equal areas of the disc get equally many rays.
                 let impact = ((f64::from(i) + 0.5) / f64::from(RAYS)).sqrt() as f32;
                 let degrees = rainbow_angle(impact, 1.0, n).expect("light enters water and leaves it again");
                 found[(degrees * STEPS_PER_DEGREE) as usize] += 1;
@@ -232,7 +232,7 @@ mod tests {
         }
     }
 
-    /// S8 (critical angle): whether η |I × N| / (|I| |N|) ≥ 1, in rational numbers, and how far its square is from 1.
+    /// S8 (critical angle): whether η |I × N| / (|I| |N|) ≥ 1, in rational numbers, and the distance of its square from 1.
     fn exact_total_reflection(i: Vec3, n: Vec3, n_i: f64, n_t: f64) -> (bool, f64) {
         use crate::math::rational::{cross, dot, point};
         use dashu::rational::RBig;
@@ -289,7 +289,7 @@ mod tests {
                     let transmitted = n_t * cos_t / (n_i * cos_i) * 0.5 * (across * across + along * along);
                     assert!((reflected + transmitted - 1.0).abs() <= 4.0 * f64::EPSILON, "{n_i} {n_t} {cos_i}");
                 }
-                // Up to rounding where it is flat.
+                // Up to rounding, where the curve is flat.
                 if n_i < n_t {
                     let brewster = libm::cos(libm::atan(n_t / n_i));
                     assert!(cos_i > brewster || reflected >= last, "{n_i} {n_t} {cos_i}");
@@ -317,7 +317,7 @@ mod tests {
         let through = |n: f64| {
             let half = apex / 2.0;
             let theta = libm::asin(n * libm::sin(half));
-            // Faces that lean to either side of the vertical by half the apex angle.
+            // Faces tilted to either side of the vertical by half the apex angle.
             let face = |side: f64| DVec3::new(side * libm::cos(half), libm::sin(half), 0.0).as_vec3();
             let (entry, exit) = (face(-1.0), face(1.0));
             let rise = theta - half;
@@ -332,7 +332,7 @@ mod tests {
         }
         let spread = (through(f).0 - through(c).0, through(f).1 - through(c).1);
         assert!((spread.0 - spread.1).abs() < 1e-6, "{spread:?}");
-        // Cauchy's equation by the Abbe number, which pictures use, stays near it over the visible spectrum.
+        // Cauchy's equation from the Abbe number, which pictures use, stays close to it over the visible spectrum.
         let abbe = (d - 1.0) / (f - c);
         let off = |nm: f64| (dispersed_index(d, 20.0 / abbe, nm) - index(nm)).abs();
         let worst = (40..=70).map(|x| off(f64::from(x) * 10.0)).fold(0.0, f64::max);

@@ -1,4 +1,4 @@
-//! The part of a mesh around a hit: interpolated attributes, texture coordinates, and how maps turn the normal.
+//! The triangle of a mesh around a hit: interpolated attributes, texture coordinates, and normals perturbed by maps.
 
 use super::shadow::curve::Curve;
 use super::texture::{ColorSpace, TextureStore};
@@ -7,10 +7,10 @@ use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::{Material, Mesh, TexCoords, TextureRef, UvTransform};
 use std::cell::Cell;
 
-/// Lengths of edges whose fourth powers are ordinary numbers.
+/// Edge lengths whose fourth powers neither overflow nor underflow.
 const ORDINARY: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
 
-/// How the weights of a triangle's second and third corner grow along its plane, per world unit.
+/// Gradients of the barycentric weights of a triangle's second and third corner in its plane, per world unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Gradients {
     pub second: Vec3,
@@ -18,14 +18,14 @@ pub(crate) struct Gradients {
 }
 
 impl Gradients {
-    /// Zero for a triangle without area.
+    /// Gradients of a triangle; zero if it has no area.
     pub(crate) fn new([a, b, c]: [Vec3; 3]) -> Self {
         let (e1, e2) = (b - a, c - a);
         let longest = e1.abs().max(e2.abs()).max_element();
         if ORDINARY.contains(&longest) {
             return Self::of_edges(e1, e2);
         }
-        // The same of edges about 1 long; powers of two change no digit.
+        // Scales the edges to a length of about 1; powers of two are exact.
         let scale = libm::exp2f(-libm::floorf(libm::log2f(longest)).clamp(-126.0, 126.0));
         let Self { second, third } = Self::of_edges(e1 * scale, e2 * scale);
         Self { second: second * scale, third: third * scale }
@@ -41,15 +41,15 @@ impl Gradients {
         Self { second: e2.cross(normal) * inverse, third: normal.cross(e1) * inverse }
     }
 
-    /// How coordinates of the corners change along the axes of a footprint.
+    /// Change of texture coordinates along the axes of a footprint, from their differences along the edges.
     #[inline(always)]
     pub(crate) fn of_coordinates(&self, edges: [Vec2; 2], print: &Footprint) -> [Vec2; 2] {
         let change = |v: Vec3| edges[0] * self.second.dot(v) + edges[1] * self.third.dot(v);
         [change(print.along), change(print.across)]
     }
 
-    /// How the mesh's own normal, of unit length, turns along two ways in the plane of the triangle, by the normals of its
-    /// corners, which differ, and their weights.
+    /// Derivatives of the unit-length mesh normal along two directions in the plane of the triangle, from the corner normals,
+    /// which must differ, and their weights.
     #[inline(always)]
     pub(crate) fn of_normal(
         &self,
@@ -76,22 +76,22 @@ fn turned(placement: &Placement, normal: Vec3) -> DVec3 {
     placement.normal_from_object * normal.as_dvec3()
 }
 
-/// The part of a mesh around a hit: three corners and their weights.
+/// The triangle of a mesh around a hit: three corners and their barycentric weights.
 pub(crate) struct Patch<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) placement: &'a Placement,
     pub(super) corners: [u32; 3],
     pub(super) weights: [f32; 3],
     pub(super) vertices: [Vec3; 3],
-    /// What of it maps are read for.
+    /// Footprint over which maps are filtered.
     pub(super) print: Footprint,
-    /// The coordinates that were asked for last: the maps of a material mostly share them.
+    /// Cached coordinates of the last map: the maps of a material mostly share them.
     pub(super) last: Cell<Option<(TextureRef, Coordinates)>>,
-    /// What was read last: one texture often says several things.
+    /// Cached last texel: one texture often serves several purposes.
     pub(super) read: Cell<Option<(TextureRef, ColorSpace, Vec4)>>,
 }
 
-/// The two axes, world space, of the ellipse in which a ray's cone meets a surface; one pixel each.
+/// Axes, in world space, of the ellipse in which a ray's cone meets a surface; each spans one pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Footprint {
     pub(super) along: Vec3,
@@ -99,15 +99,15 @@ pub(crate) struct Footprint {
 }
 
 impl Footprint {
-    /// The footprint of a ray without width.
+    /// Footprint of a ray without width.
     pub(crate) const NONE: Self = Self { along: Vec3::ZERO, across: Vec3::ZERO };
 
-    /// Cone of diameter `width` along the unit vector `dir` on a surface with unit normal `normal`.
+    /// Footprint of a cone of diameter `width` along the unit vector `dir` on a surface with unit normal `normal`.
     ///
     /// After T. Akenine-Möller et al., "Improved Shader and Texture Level of Detail Using Ray Cones" (2021).
     #[inline(always)]
     pub(crate) fn new(dir: Vec3, normal: Vec3, width: f32) -> Self {
-        // A grazing cone covers unboundedly much; beyond this the texture is at its smallest copy anyway.
+        // The footprint of a grazing cone is unbounded; beyond this length the texture is at its coarsest mip level anyway.
         const LONGEST: f32 = 1e4;
         let axis = |v: Vec3| {
             let seen = (v - dir.dot(v) * dir).length();
@@ -119,30 +119,30 @@ impl Footprint {
     }
 }
 
-/// Texture coordinates at a point and their change along both axes of a [`Footprint`].
+/// Texture coordinates at a point and their change along the two axes of a [`Footprint`].
 #[derive(Clone, Copy)]
 pub(super) struct Coordinates {
     pub uv: Vec2,
     pub along: Vec2,
     pub across: Vec2,
-    /// Change along the second and third corner's edge.
+    /// Change along the edges to the second and the third corner.
     edges: [Vec2; 2],
 }
 
-/// The colour between those of three corners: exactly theirs where these agree, so that an alpha that is the same
-/// everywhere is not below itself anywhere.
+/// Interpolates three corner colours: exact where these agree, so that an alpha that is the same everywhere is not smaller
+/// anywhere.
 #[inline(always)]
 pub(crate) fn mixed_color([a, b, c]: [Vec4; 3], [_, second, third]: [f32; 3]) -> Vec4 {
     a + (b - a) * second + (c - a) * third
 }
 
-/// The colour of vertices at a point of a triangle with these corners, linear RGBA; white when the mesh has none.
+/// Vertex colour at a point of a triangle with these corners, linear RGBA; white when the mesh has none.
 pub(super) fn color_at(mesh: &Mesh, corners: [u32; 3], weights: [f32; 3]) -> Vec4 {
     let [a, b, c] = corners.map(|i| mesh.colors.get(i as usize).copied());
     a.zip(b).zip(c).map_or(Vec4::ONE, |((a, b), c)| mixed_color([a, b, c], weights))
 }
 
-/// The coordinates of a map there, and those of the corners but for the offset; `None` when the mesh has none.
+/// Texture coordinates of a map at the point, and those of the corners without the offset; `None` when the mesh has none.
 pub(super) fn coordinates_at(
     mesh: &Mesh,
     corners: [u32; 3],
@@ -155,7 +155,7 @@ pub(super) fn coordinates_at(
 }
 
 impl Patch<'_> {
-    /// Moves it to another point of its triangle.
+    /// Moves the patch to another point of its triangle.
     pub(super) fn move_to(&mut self, weights: [f32; 3], print: Footprint) {
         (self.weights, self.print) = (weights, print);
         self.last.set(None);
@@ -175,7 +175,7 @@ impl Patch<'_> {
         color_at(self.mesh, self.corners, self.weights)
     }
 
-    /// The texture at this point, linear RGBA.
+    /// Texel at this point, linear RGBA.
     pub(crate) fn texel(&self, map: &TextureRef, space: ColorSpace, store: &TextureStore) -> Vec4 {
         if let Some((last, meaning, texel)) = self.read.get()
             && last == *map
@@ -189,7 +189,7 @@ impl Patch<'_> {
         texel
     }
 
-    /// The alpha of the texture at this point, which is the same whether or not its other numbers are colours.
+    /// Alpha of the texture at this point, which does not depend on the colour space of the other channels.
     pub(crate) fn alpha(&self, map: &TextureRef, store: &TextureStore) -> f32 {
         match self.read.get() {
             Some((last, ColorSpace::Srgb, texel)) if last == *map => texel.w,
@@ -197,7 +197,7 @@ impl Patch<'_> {
         }
     }
 
-    /// A channel of the texture at this point, linear, as sharp as it is stored.
+    /// One channel of the texture at this point, linear, at the full resolution.
     pub(crate) fn channel<const CHANNEL: usize>(&self, map: &TextureRef, store: &TextureStore) -> f32 {
         store.channel::<CHANNEL>(map.texture, self.coordinates(map).uv)
     }
@@ -231,13 +231,13 @@ impl Patch<'_> {
         smooth_normal(self.placement, self.mix(&self.mesh.normals)?)
     }
 
-    /// Whether the mesh's own normals differ over it: whether it stands for something round.
+    /// Whether the corner normals differ, that is, the triangle stands for a curved surface.
     #[inline]
     pub(super) fn is_curved(&self) -> bool {
         self.corner_normals().is_some_and(differ)
     }
 
-    /// The surface that its normals describe, on their own side or, with −1, on the other; `None` if it is flat.
+    /// The curved surface that the normals describe, on their own side or, with −1, on the other; `None` if it is flat.
     pub(super) fn curve(&self, side: f32) -> Option<Curve> {
         let normals = self.corner_normals().filter(|&normals| differ(normals))?;
         let [a, b, c] = normals.map(|normal| smooth_normal(self.placement, normal).map(|normal| normal * side));
@@ -251,26 +251,26 @@ impl Patch<'_> {
         Some([a?, b?, c?])
     }
 
-    /// How the mesh's own normal, of unit length, turns along two ways in the plane of the triangle; zero where it is flat.
+    /// Derivatives of the unit-length mesh normal along two directions in the plane of the triangle; zero where it is flat.
     pub(super) fn bends(&self, ways: [Vec3; 2]) -> [Vec3; 2] {
         let Some(normals) = self.corner_normals().filter(|&normals| differ(normals)) else { return [Vec3::ZERO; 2] };
         Gradients::new(self.vertices).of_normal(self.placement, normals, self.weights, ways)
     }
 
-    /// How far a normal map turns the normal in `reach` of both axes of a footprint: the squares of the angles, summed.
+    /// Variation of the mapped normal within `reach` of both axes of a footprint: the squares of the angles, summed.
     pub(super) fn turning_of_map(&self, map: &TextureRef, scale: f32, store: &TextureStore, reach: f32) -> f32 {
         let at = self.coordinates(map);
         turning_of(store.changes(map.texture, at.uv, [at.along, at.across], reach), scale)
     }
 
-    /// Tangent and bitangent, unit and perpendicular to `normal`: those of the mesh, or those of the coordinates.
+    /// Tangent and bitangent, orthonormal to `normal`: those of the mesh, or those of the texture coordinates.
     pub(super) fn tangents(&self, normal: Vec3, map: &TextureRef) -> Option<(Vec3, Vec3)> {
         let given = self.mix(&self.mesh.tangents).and_then(|t| given_tangent(self.placement, t, normal));
         let (tangent, sign) = given.or_else(|| self.tangent_of_coordinates(normal, map))?;
         Some((tangent, normal.cross(tangent) * sign))
     }
 
-    /// The direction in which u grows, and the handedness that makes the bitangent point against v, which runs down.
+    /// The direction in which u grows, and the handedness that turns the bitangent against v, which runs down.
     fn tangent_of_coordinates(&self, normal: Vec3, map: &TextureRef) -> Option<(Vec3, f32)> {
         let [a, b] = self.coordinates(map).edges;
         let (e1, e2) = (self.vertices[1] - self.vertices[0], self.vertices[2] - self.vertices[0]);
@@ -285,7 +285,7 @@ impl Patch<'_> {
         Some((tangent, sign))
     }
 
-    /// As [`Self::tangents`] has them, along the coordinates of a map as its transform turns them: what its texels are given in.
+    /// As [`Self::tangents`], but along the transformed coordinates of a map: the frame in which its texels are given.
     fn tangents_of_map(&self, normal: Vec3, map: &TextureRef) -> Option<(Vec3, Vec3)> {
         let made_along = self.mesh.tangents_along;
         let made_for_it = made_along.is_none_or(|along| along.set == map.uv_set);
@@ -297,7 +297,7 @@ impl Patch<'_> {
         Some((tangent, normal.cross(tangent) * sign))
     }
 
-    /// The normal as a normal map turns it, whose x and y are scaled.
+    /// The normal as perturbed by a normal map, with its x and y scaled.
     #[inline]
     pub(crate) fn normal_mapped(
         &self,
@@ -328,7 +328,7 @@ impl Patch<'_> {
         frame.is_valid().then_some(frame)
     }
 
-    /// The normal as the material's bump map turns it: by the slope of the heights, from differences one texel wide.
+    /// The normal as perturbed by the material's bump map: by the slope of the heights, from differences one texel wide.
     ///
     /// J. F. Blinn, "Simulation of Wrinkled Surfaces" (1978), with heights in units of the texture's side.
     #[inline]
@@ -382,30 +382,30 @@ impl BakedFrame {
     }
 }
 
-/// Whether the normals of a triangle's corners are not all the same.
+/// Whether the corner normals of a triangle differ.
 #[inline(always)]
 pub(super) fn differ([a, b, c]: [Vec3; 3]) -> bool {
     a != b || a != c
 }
 
-/// The tangent that a file gives, mixed of those of the corners, perpendicular to `normal` and of unit length, and the sign
+/// The tangent given by a file, interpolated between the corners, made perpendicular to `normal` and of unit length, and the sign
 /// of its bitangent.
 #[inline(always)]
 pub(crate) fn given_tangent(placement: &Placement, mixed: Vec4, normal: Vec3) -> Option<(Vec3, f32)> {
     let along = (placement.world_from_object * mixed.truncate().as_dvec3()).as_vec3();
-    // A mirrored instance turns the frame's handedness round.
+    // A mirrored instance reverses the handedness of the frame.
     let sign = if (mixed.w < 0.0) == placement.mirrored { 1.0 } else { -1.0 };
     Some((perpendicular(along, normal)?, sign))
 }
 
-/// A normal as a texel of a normal map, whose x and y are scaled, turns it between its tangent and bitangent.
+/// Returns the normal perturbed by a texel of a normal map, with its x and y scaled, in the frame of tangent and bitangent.
 #[inline(always)]
 pub(crate) fn turned_by_texel(normal: Vec3, [tangent, bitangent]: [Vec3; 2], texel: Vec3, scale: f32) -> Option<Vec3> {
     let texel = texel * 2.0 - 1.0;
     (tangent * (texel.x * scale) + bitangent * (texel.y * scale) + normal * texel.z).try_normalize()
 }
 
-/// How far a normal map turns the normal where its texels change so much along two ways: the squares of the angles, summed.
+/// Variation of the mapped normal where its texels change by this much along two directions: the squares of the angles, summed.
 #[inline(always)]
 pub(crate) fn turning_of([along, across]: [Vec4; 2], scale: f32) -> f32 {
     let scale = Vec3::new(scale, scale, 1.0);
@@ -432,21 +432,21 @@ impl Turn {
     }
 }
 
-/// How tangents turn to run along the coordinates of a map, where its transform turns or mirrors those that they were made
-/// along.
+/// Rotation of tangents to run along the coordinates of a map, where its transform rotates or mirrors the coordinates that the
+/// tangents were made for.
 ///
-/// A texture that is laid out by transformed coordinates is the same as one on coordinates that were transformed before, and
-/// has the same frames (Khronos, *KHR_texture_transform*). Those of a file run along its coordinates as they are.
+/// A texture laid out by transformed coordinates is the same as one on coordinates that were transformed beforehand, and has the
+/// same frames (Khronos, *KHR_texture_transform*). The tangents in a file run along its untransformed coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FrameTurn {
-    /// Where the u of the map grows, along the u and the v of the tangents; of unit length.
+    /// Direction in which the map's u grows, in terms of the u and the v of the tangents; of unit length.
     along: Vec2,
-    /// Negative where it mirrors.
+    /// Negative where the transform mirrors.
     sign: f32,
 }
 
 impl FrameTurn {
-    /// `None` where frames stay as they are.
+    /// `None` where frames stay unchanged.
     pub(crate) fn new(made_along: Option<TexCoords>, map: &TextureRef) -> Option<Self> {
         let (from, to) = (made_along.unwrap_or_default().transform, map.transform);
         if (from.rotation, from.scale) == (to.rotation, to.scale)
@@ -456,7 +456,7 @@ impl FrameTurn {
         }
         let (from, to) = (Turn::new(&from), Turn::new(&to));
         let determinants = [from, to].map(|turn| turn.x_axis.perp_dot(turn.y_axis));
-        // The inverse takes (1, 0) there.
+        // The inverse of the map's transform takes (1, 0) to this direction.
         let along_map = Vec2::new(to.y_axis.y, -to.x_axis.y) * determinants[1].signum();
         let along = from.apply(along_map).try_normalize()?;
         let determinant = determinants[0] * determinants[1];
@@ -464,7 +464,7 @@ impl FrameTurn {
         (turns && determinant != 0.0).then_some(Self { along, sign: determinant.signum() })
     }
 
-    /// A tangent with the sign of its bitangent, turned about a normal. v runs down, against the bitangent.
+    /// Rotates a tangent, given with the sign of its bitangent, about a normal. v runs down, against the bitangent.
     #[inline(always)]
     pub(crate) fn apply(&self, (tangent, sign): (Vec3, f32), normal: Vec3) -> (Vec3, f32) {
         let bitangent = normal.cross(tangent) * sign;
@@ -484,13 +484,13 @@ impl FrameTurn {
     }
 }
 
-/// `v` without its part along `normal`, of unit length.
+/// `v` without its component along `normal`, of unit length.
 #[inline(always)]
 fn perpendicular(v: Vec3, normal: Vec3) -> Option<Vec3> {
     (v - normal * normal.dot(v)).try_normalize()
 }
 
-/// An interpolated normal of a mesh as its instance turns it, of unit length; `None` where it has none.
+/// Interpolated normal of a mesh, transformed by its instance, of unit length; `None` if it has no direction.
 #[inline(always)]
 pub(crate) fn smooth_normal(placement: &Placement, interpolated: Vec3) -> Option<Vec3> {
     let normal = (placement.normal_from_object * interpolated.as_dvec3()).try_normalize()?.as_vec3();

@@ -1,4 +1,4 @@
-//! Rays from the eye: the first wave of every batch of pixels, many at a time.
+//! Eye rays: the first wave of every batch of pixels, set up many at a time.
 
 use super::media::Media;
 use super::view::{Lens, PrimaryRay, View};
@@ -12,82 +12,82 @@ use crate::scene::Scene;
 /// Rays that are set up at a time.
 const RUN: usize = 64;
 
-/// Eye rays, and what they hit.
+/// Eye rays, and their hits.
 #[derive(Debug, Default)]
 pub(crate) struct PrimaryRays {
-    /// There are so many; what lies behind in the buffers is left from others.
+    /// Number of rays; the rest of the buffers is left over from earlier batches.
     count: usize,
     rays: Vec<Ray>,
     pub hits: Vec<Hit>,
-    /// Their directions by axis.
+    /// Directions of the rays, by axis.
     dirs: [Vec<f32>; 3],
     cone_width: Vec<f32>,
     cone_spread: Vec<f32>,
-    /// Whether all start where the eye is.
+    /// Whether all rays start at the eye itself.
     is_pencil: bool,
-    /// What all start inside of.
+    /// Media that all rays start inside of.
     pub media: Media,
 }
 
-/// Rays that ask for their first hits.
+/// A query for the first hits of rays.
 pub(crate) struct PrimaryQuery<'e> {
     pub rays: &'e [Ray],
-    /// The rays as a pencil, if all start at one place.
+    /// The rays as a pencil, if all have the same origin.
     pub pencil: Option<Pencil<'e>>,
-    /// Widths and growths of the cones around them.
+    /// Widths and spreads of the rays' cones.
     pub cones: [&'e [f32]; 2],
-    /// Room for a hit of each.
+    /// Room for the hit of each ray.
     pub hits: &'e mut [Hit],
 }
 
-/// A lens with an opening: what is not at its focus is blurred.
+/// A thin lens with an aperture: what is out of focus is blurred.
 ///
-/// R. L. Cook, T. Porter, L. Carpenter, "Distributed Ray Tracing" (1984). Uniform sampling has one point of the lens for
-/// each of its samples, another for each pixel.
+/// R. L. Cook, T. Porter, L. Carpenter, "Distributed Ray Tracing" (1984). Uniform sampling uses a different point of the lens for
+/// each sample, and other points in each pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThinLens {
-    /// Radius of the opening, world units.
+    /// Radius of the aperture, world units.
     pub radius: f64,
-    /// Distance along the view axis of what is sharp, world units; above 0.
+    /// Distance of the focal plane along the view axis, world units; above 0.
     pub focus: f64,
 }
 
-/// A point of the picture, from its upper left corner in pixels, seen through a point of the lens.
+/// A point of the picture, in pixels from its upper left corner, seen through a point of the lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CameraSample {
     pub x: f64,
     pub y: f64,
-    /// In the unit square, which is laid over the disc of the lens.
+    /// Point of the lens, in the unit square that is mapped to its disc.
     pub lens: [f64; 2],
 }
 
 impl CameraSample {
-    /// Through the middle of the lens.
+    /// The point of the picture, seen through the centre of the lens.
     pub(crate) fn new(x: f64, y: f64) -> Self {
         Self { x, y, lens: [0.5; 2] }
     }
 }
 
-/// Where eye rays come from.
+/// Origin and aim of eye rays.
 #[derive(Clone, Copy)]
 pub(crate) struct Eye<'a> {
     pub view: &'a View,
     pub width: u32,
     pub height: u32,
-    /// What is subtracted from world positions.
+    /// Centre of the scene, which is subtracted from world positions.
     pub center: DVec3,
-    /// Sharpness of one sample relative to a pixel.
+    /// Footprint width of one sample relative to a pixel.
     pub sample_width: f32,
-    /// Everything that can be seen, where rays may start just before it.
+    /// Ball around everything visible; rays may start just before it.
     pub scene: Ball,
-    /// `None`: everything is sharp.
+    /// `None`: a pinhole, everything is sharp.
     pub lens: Option<ThinLens>,
 }
 
 /// An eye farther from the scene than this many of its diagonals starts its rays just before the scene.
 const FAR: f64 = 4.0;
 
-/// A ball around everything bounded, world space; an infinite one when eye rays must not be shortened.
+/// A ball around everything bounded, world space; infinite where eye rays must not be shortened.
 #[derive(Clone, Copy)]
 pub(crate) struct Ball {
     pub center: DVec3,
@@ -98,19 +98,19 @@ pub(crate) struct Ball {
 struct CenteredRay {
     origin: Vec3,
     dir: Vec3,
-    /// Width of a sample at the origin, and its growth.
+    /// Width of the sample's cone at the origin, and its spread.
     cone_width: f32,
     cone_spread: f32,
 }
 
 impl Eye<'_> {
-    /// The ray of a place, and what it carries inside of `media`, as sample 0.
+    /// Ray and path of a camera sample inside of `media`, as sample 0.
     pub(crate) fn ray_with_path(&self, place: CameraSample, media: Media) -> (Ray, Path) {
         let CenteredRay { origin, dir, cone_width, cone_spread } = self.ray(place);
         (ray(origin, dir, 0), Path::from_eye(cone_width, cone_spread, media))
     }
 
-    /// The ray of a place, started before the scene when the eye is far away, in the centred frame.
+    /// Ray of a camera sample in the centred frame, started just before the scene when the eye is far away.
     fn ray(&self, place: CameraSample) -> CenteredRay {
         let eye = self.view.primary(place.x, place.y, self.width, self.height);
         self.start(match self.lens {
@@ -119,13 +119,13 @@ impl Eye<'_> {
         })
     }
 
-    /// Whether all rays start where the eye is.
+    /// Whether all rays start at the eye itself.
     fn sees_from_one_place(&self) -> bool {
         let perspective = matches!(self.view.lens, Lens::Perspective { .. });
         perspective && self.lens.is_none() && !self.scene.seen_from(self.view.eye).far
     }
 
-    /// The ray from a point of the lens, in its unit disc, to where `ray` meets what is in focus.
+    /// The ray from a point of the lens, in its unit disc, to where `ray` meets the focal plane.
     #[inline(always)]
     fn through(&self, lens: ThinLens, ray: PrimaryRay, [x, y]: [f64; 2]) -> PrimaryRay {
         let view = self.view;
@@ -140,7 +140,7 @@ impl Eye<'_> {
         self.skip(eye, self.scene.seen_from(eye.origin).distance_before(eye.dir))
     }
 
-    /// Starts a ray so far along.
+    /// Starts a ray at `distance` along it.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "widths are estimates")]
     fn skip(&self, eye: PrimaryRay, distance: f64) -> CenteredRay {
@@ -153,7 +153,7 @@ impl Eye<'_> {
     }
 }
 
-/// A point of the unit square laid over the unit disc: areas keep their size, and neighbours stay together.
+/// Maps the unit square to the unit disc: areas keep their ratios, and neighbours stay together.
 ///
 /// P. Shirley, K. Chiu, "A Low Distortion Map Between Disk and Square" (1997).
 fn on_disc([u, v]: [f64; 2]) -> [f64; 2] {
@@ -174,17 +174,17 @@ fn ray(origin: Vec3, dir: Vec3, sample: u32) -> Ray {
     Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample }
 }
 
-/// A ball as a place sees it.
+/// A ball as seen from a point.
 #[derive(Clone, Copy)]
 struct SeenBall {
     to_center: DVec3,
     radius: f64,
-    /// Whether it is so far away that rays need not start at the place.
+    /// Whether the ball is so far away that rays need not start at the point.
     far: bool,
 }
 
 impl Ball {
-    /// Around all that is bounded; unbounded planes may lie anywhere before it, so that nothing can be skipped.
+    /// Ball around everything bounded; unbounded planes may lie anywhere before it, so with them nothing can be skipped.
     pub(super) fn around(scene: &Scene, world: &World) -> Self {
         let (lo, hi) = world.bounds;
         let radius = 0.5 * (hi - lo).length();
@@ -200,10 +200,10 @@ impl Ball {
 }
 
 impl SeenBall {
-    /// The distance that a ray can skip because all of it lies before the ball.
+    /// Distance that a ray can skip because all of it lies before the ball.
     #[inline(always)]
     fn distance_before(&self, dir: DVec3) -> f64 {
-        // Twice the radius leaves room for the rounding of the start.
+        // Twice the radius leaves room for the rounding of the origin.
         let skipped = self.to_center.dot(dir) - 2.0 * self.radius;
         if self.far & (skipped > 0.0) & (skipped < f64::INFINITY) { skipped } else { 0.0 }
     }
@@ -214,12 +214,12 @@ impl PrimaryRays {
         (self.count, self.is_pencil) = (0, true);
     }
 
-    /// All rays.
+    /// Returns all rays.
     pub(crate) fn rays(&self) -> &[Ray] {
         &self.rays[..self.count]
     }
 
-    /// Adds the rays of these places; the `i`th ray is that of sample `i`.
+    /// Adds the rays of these camera samples; the `i`th ray is that of sample `i`.
     pub(crate) fn send(&mut self, eye: &Eye, places: impl Iterator<Item = CameraSample>) {
         let mut run = Run::default();
         places.for_each(|CameraSample { x, y, lens }| {
@@ -236,7 +236,7 @@ impl PrimaryRays {
         self.take(eye, &mut run);
     }
 
-    /// Adds the rays of places seen through the middle of the lens, by column and row.
+    /// Adds the rays of points given by column and row, seen through the centre of the lens.
     pub(crate) fn send_columns(&mut self, eye: &Eye, x: &[f64], y: &[f64]) {
         let mut run = Run::default();
         for (x, y) in x.chunks(RUN).zip(y.chunks(RUN)) {
@@ -247,8 +247,8 @@ impl PrimaryRays {
         }
     }
 
-    /// Adds the rays of the samples that lie at the same offsets in each of these pixels, seen through the middle of the lens;
-    /// numbered as by [`Self::send`].
+    /// Adds the rays of samples at the same offsets in each of these pixels, seen through the centre of the lens; numbered as by
+    /// [`Self::send`].
     pub(crate) fn send_each(&mut self, eye: &Eye, pixels: &[(u32, u32)], offsets: &[(f64, f64)]) {
         let mut run = Run::default();
         for (x, y) in pixels.iter().map(|&(x, y)| (f64::from(x), f64::from(y))) {
@@ -288,7 +288,7 @@ impl PrimaryRays {
         run.count = 0;
     }
 
-    /// Makes buffers that hold so many, if they are shorter. They stay as long: what is written is not cleared before.
+    /// Grows the buffers to `count` rays if they are shorter. They never shrink, and old contents are overwritten, not cleared.
     fn make_room(&mut self, count: usize) {
         if self.rays.len() < count {
             let count = count.next_power_of_two();
@@ -299,39 +299,39 @@ impl PrimaryRays {
         }
     }
 
-    /// What is asked of all of them.
+    /// Returns the query for the first hits of all rays.
     pub(crate) fn ask(&mut self) -> PrimaryQuery<'_> {
         let Self { count, rays, hits, dirs, cone_width, cone_spread, is_pencil, .. } = self;
         let rays = &rays[..*count];
-        // Whoever is asked writes each of them.
+        // The query overwrites every hit.
         hits.resize(*count, Hit::MISS);
         let first = rays.first().filter(|_| *is_pencil);
         let pencil = first.map(|ray| Pencil { origin: ray.origin, dirs: dirs.each_ref().map(|row| &row[..*count]) });
         PrimaryQuery { rays, pencil, cones: [&cone_width[..*count], &cone_spread[..*count]], hits }
     }
 
-    /// Their directions by axis, and how wide their cones grow, radians.
+    /// Directions by axis, and cone spreads, radians.
     pub(crate) fn columns(&self) -> ([&[f32]; 3], &[f32]) {
         (self.dirs.each_ref().map(|row| &row[..self.count]), &self.cone_spread[..self.count])
     }
 
-    /// Whether they start inside of something.
+    /// Whether the rays start inside of a medium.
     pub(crate) fn are_immersed(&self) -> bool {
         self.media != Media::OUTSIDE
     }
 
-    /// What the `i`th ray carries.
+    /// Path of the `i`th ray.
     pub(crate) fn path(&self, i: usize) -> Path {
         Path::from_eye(self.cone_width[i], self.cone_spread[i], self.media)
     }
 }
 
-/// As many elements as a run has, from one on.
+/// Elements of one run, from `start` on; `None` if there are fewer.
 fn from<T>(buffer: &mut [T], start: usize) -> Option<&mut [T; RUN]> {
     buffer.get_mut(start..)?.first_chunk_mut()
 }
 
-/// Places by number, and what is found of their rays, which compilers make lanes of as long as it lies in one structure.
+/// Camera samples by index, and the rays found for them; compilers vectorise this as long as it lies in one structure.
 struct Run {
     count: usize,
     x: [f64; RUN],
@@ -361,11 +361,11 @@ impl Default for Run {
 struct Aim<'a> {
     eye: &'a Eye<'a>,
     run: &'a mut Run,
-    /// Where the rays go.
+    /// Destination of the rays.
     rays: &'a mut [Ray; RUN],
-    /// Where their directions and cones go, by axis, width and growth.
+    /// Destination of directions by axis, cone widths and cone spreads.
     columns: [&'a mut [f32; RUN]; 5],
-    /// The sample of the first ray.
+    /// Sample of the first ray.
     sample: u32,
 }
 
@@ -377,7 +377,7 @@ impl Kernel for Aim<'_> {
         let Self { eye, run, rays, columns, sample } = self;
         let view = *eye.view;
         let eye = Eye { view: &view, ..*eye };
-        // What all rays share is decided outside the loop, which then is a formula.
+        // Decisions common to all rays are taken outside the loop, which then is branch-free.
         match (view.lens, eye.lens) {
             (Lens::Perspective { .. }, None) => {
                 let ball = eye.scene.seen_from(view.eye);
@@ -389,7 +389,7 @@ impl Kernel for Aim<'_> {
             }
             (_, None) => run.each(&eye, |ray, _| eye.start(ray)),
             (_, Some(lens)) => {
-                // By themselves, as they are no formula: the others become lanes.
+                // Mapped in a loop of its own, which has branches: the rest vectorises.
                 run.lens[..run.count.min(RUN)].iter_mut().for_each(|at| *at = on_disc(*at));
                 run.each(&eye, |ray, at| eye.start(eye.through(lens, ray, at)));
             }
@@ -399,7 +399,7 @@ impl Kernel for Aim<'_> {
 }
 
 impl Run {
-    /// Finds every ray from that through the middle of the lens, and the point of the lens.
+    /// Computes every ray from the one through the centre of the lens, and the point of the lens.
     #[inline(always)]
     fn each(&mut self, eye: &Eye, start: impl Fn(PrimaryRay, [f64; 2]) -> CenteredRay) {
         for i in 0..self.count.next_multiple_of(LANES).min(RUN) {
@@ -411,7 +411,7 @@ impl Run {
         }
     }
 
-    /// Rays from their columns, as they lie in memory: four numbers at a time; and the columns themselves.
+    /// Writes the rays as they lie in memory, four numbers at a time, and the columns.
     #[inline(always)]
     fn write_rays<S: Simd>(&self, s: S, rays: &mut [Ray; RUN], columns: [&mut [f32; RUN]; 5], mut sample: u32) {
         let mut columns = columns;

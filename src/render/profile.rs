@@ -1,4 +1,4 @@
-//! Where the time of a rendering goes: each class of rays in the structure, and all the rest.
+//! Profile of a rendering: the time of each ray class in the structure, and of everything else.
 
 use super::by_class::ByClass;
 use super::observer::{Observer, Question};
@@ -7,28 +7,27 @@ use crate::accel::{Hit, Probe, Ray};
 use crate::stopwatch::{Spent, Stopwatch};
 use std::time::{Duration, Instant};
 
-/// Where the time of a rendering went.
+/// Times of a rendering.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Profile {
-    /// What is computed once for an image: lights, sky, limits.
+    /// Work done once per picture: lights, sky, limits.
     pub prepare: Spent,
     /// All tiles.
     pub tiles: Spent,
-    /// Of the processor time of the tiles, what each class of rays took in the structure, in the order of
-    /// [`super::CLASS_NAMES`].
+    /// Share of the tiles' processor time that each ray class spent in the structure, in the order of [`super::CLASS_NAMES`].
     pub trace: [Duration; 4],
     /// Rays of each class.
     pub rays: [u64; 4],
 }
 
 impl Profile {
-    /// Of the processor time of the tiles, everything outside the structure: setting up rays, surfaces, shading, sums.
+    /// Processor time of the tiles outside the structure: setting up rays, surfaces, shading, sums.
     pub fn shade(&self) -> Duration {
         self.tiles.cpu.saturating_sub(self.trace.iter().sum())
     }
 }
 
-/// Renders on all threads of the current rayon pool and takes the time of each slice of rays; same pixels.
+/// Renders on all threads of the current rayon pool and times each slice of rays; same pixels.
 pub fn render_profiled(job: &Job, progress: &dyn Progress) -> (Rendered, Profile) {
     let (mut watch, mut prepare) = (Stopwatch::of_all_threads(), Spent::default());
     let (rendered, clocks) = render_with::<Clock>(job, progress, || prepare = watch.lap());
@@ -37,8 +36,8 @@ pub fn render_profiled(job: &Job, progress: &dyn Progress) -> (Rendered, Profile
     (rendered, Profile { prepare, tiles, trace, rays })
 }
 
-/// Processor time and rays of each class: slices are timed by the clock on the wall, which costs least to read, and what
-/// threads that had to wait for a processor measured too much is taken off all alike.
+/// Processor time and rays of each class: slices are timed by the wall clock, which is cheapest to read, and the excess that
+/// waiting threads measure is removed from all classes in proportion.
 fn shares(threads: Vec<ByClass<Clock>>, cpu: Duration) -> ([Duration; 4], [u64; 4]) {
     let (mut busy, mut walked, mut rays) = (Duration::ZERO, [Duration::ZERO; 4], [0; 4]);
     for mut thread in threads {
@@ -55,27 +54,27 @@ fn shares(threads: Vec<ByClass<Clock>>, cpu: Duration) -> ([Duration; 4], [u64; 
 /// Time spent on the rays of one class.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Clock {
-    /// When the first batch began, this batch, and when the last answer came.
+    /// Beginning of the first batch, beginning of this batch, and time of the last answer.
     first: Option<Instant>,
     pub(super) began: Option<Instant>,
     last: Option<Instant>,
-    /// When the rays asked last were.
+    /// Time at which the last query began.
     asked: Option<Instant>,
-    /// In the structure: in this batch, and before it.
+    /// Time in the structure: in this batch, and in earlier ones.
     pub(super) walking: Duration,
     before: Duration,
     rays: u64,
 }
 
 impl Clock {
-    /// From the first batch to the beginning of the last, or the last answer.
+    /// Time from the first batch to the last answer, or to the beginning of the last batch if that is later.
     fn since_first(&self) -> Duration {
         let end = self.last.max(self.began);
         self.first.zip(end).map_or(Duration::ZERO, |(first, end)| end.saturating_duration_since(first))
     }
 }
 
-// Walks are not listened to: what is timed is what is done without a clock.
+// Walks are not probed: the timed code is the code that runs without a clock.
 impl Probe for Clock {
     const SILENT: bool = true;
 }

@@ -1,16 +1,16 @@
-//! Asking a structure what rays hit, in slices, so that a user who gives up need not wait for a whole wave.
+//! Queries of a structure in slices of rays, so that a user who cancels need not wait for a whole wave.
 
 use super::Progress;
 use super::observer::{Observer, Question};
 use super::shadow::filters::ShadowFilter;
 use crate::accel::{Accel, Hit, HitQueries, IntersectFilter, OccludedFilter, Ray};
 
-/// A structure, one worker's scratch for it, and the progress by which a user may cancel.
+/// A structure, one worker's scratch space for it, and the progress through which a user may cancel.
 pub(crate) struct RayCaster<'a, A: Accel> {
     accel: &'a A,
     scratch: A::Scratch,
     progress: &'a dyn Progress,
-    /// Set once the user has given up; answers after that mean nothing.
+    /// Set once the user has cancelled; later answers are meaningless.
     pub cancelled: bool,
 }
 
@@ -19,12 +19,12 @@ impl<'a, A: Accel> RayCaster<'a, A> {
         Self { accel, scratch: accel.scratch(), progress, cancelled: false }
     }
 
-    /// The first hit of each ray.
+    /// Finds the first hit of each ray.
     pub(crate) fn closest<P: Observer>(&mut self, rays: &[Ray], hits: &mut [Hit], probe: &mut P) {
         self.first_hits(&HitQueries::along(rays), hits, probe);
     }
 
-    /// The first hit of each ray, or the first behind another; hits that their filter rejects may be passed.
+    /// Finds the first hit of each ray, or the first behind another hit; hits that the filter rejects may be skipped.
     pub(crate) fn first_hits<P: Observer>(&mut self, queries: &HitQueries, hits: &mut [Hit], probe: &mut P) {
         let question = if queries.after.is_some() { Question::Next } else { Question::Closest };
         for (k, hits) in hits.chunks_mut(P::SLICE).enumerate() {
@@ -44,17 +44,17 @@ impl<'a, A: Accel> RayCaster<'a, A> {
         }
     }
 
-    /// The first hit of each ray behind `after`.
+    /// Finds the first hit of each ray behind `after`.
     pub(crate) fn next<P: Observer>(&mut self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], probe: &mut P) {
         self.first_hits(&HitQueries { after: Some(after), ..HitQueries::along(rays) }, hits, probe);
     }
 
-    /// Whether anything opaque is hit by each ray.
+    /// Finds whether each ray hits anything opaque.
     pub(crate) fn occluded<P: Observer>(&mut self, rays: &[Ray], occluded: &mut [bool], probe: &mut P) {
         self.occluded_filtered(rays, None, occluded, probe);
     }
 
-    /// Whether anything opaque is hit by each ray, or anything else where it stops light.
+    /// Finds whether each ray hits anything opaque, or anything else where it stops light.
     pub(crate) fn stopped<P: Observer>(&mut self, shadow_filter: &ShadowFilter, occluded: &mut [bool], probe: &mut P) {
         self.occluded_filtered(shadow_filter.rays, Some(shadow_filter), occluded, probe);
     }
@@ -85,7 +85,7 @@ impl<'a, A: Accel> RayCaster<'a, A> {
     }
 }
 
-/// What is known of rays from one on.
+/// A filter for the rays from `start` on.
 struct OffsetFilter<'a> {
     filter: &'a dyn IntersectFilter,
     start: usize,

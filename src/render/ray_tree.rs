@@ -1,7 +1,7 @@
-//! One eye ray told in order: what its walk visits and tests, what it hits, and the same for every ray that comes of it.
+//! Record of one eye ray: the nodes and prims that its walk visits and tests, its hit, and the same for all its descendants.
 //!
-//! Rays of a picture travel in waves that know no parents. A ray that starts on a surface starts at a point that follows
-//! bit for bit from the ray that found it, so that the tree is put together again from the rays themselves.
+//! Rays of a picture travel in waves without links to their parents. But the origin of a ray that starts on a surface follows bit
+//! for bit from the ray that hit the surface, so the tree is reconstructed from the rays themselves.
 
 use super::by_class::ByClass;
 use super::observer::{Observer, Question};
@@ -13,72 +13,72 @@ use crate::accel::{Hit, Probe, Ray, RayCounts};
 use crate::math::Vec3;
 use crate::math::simd::LANES;
 
-/// Something that a walk did.
+/// One step of a walk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// It entered a node or cell.
+    /// The walk entered a node or cell.
     Visit(Visit),
-    /// It tested a prim.
+    /// The walk tested a prim.
     Test(Test),
-    /// The mailbox knew this prim.
+    /// The mailbox skipped this prim.
     Skipped(u32),
-    /// It tested so many volumes.
+    /// The walk tested this number of volumes.
     Volumes(usize),
-    /// It transformed so many points into the ray's axes.
+    /// The walk transformed this number of points into the ray's axes.
     Transforms(usize),
 }
 
-/// What sent a ray.
+/// Origin of a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// The eye.
+    /// Sent by the eye.
     Primary,
-    /// A point that looks for a light.
+    /// Sent by a point towards a light.
     Shadow,
-    /// A mirror.
+    /// Reflected by a surface.
     Reflected,
-    /// Glass, or whatever else lets light through.
+    /// Refracted by glass, or passed through a surface.
     Refracted,
 }
 
 impl Class {
     const ALL: [Self; 4] = [Self::Primary, Self::Shadow, Self::Reflected, Self::Refracted];
 
-    /// As printed.
+    /// Name as printed.
     pub const fn name(self) -> &'static str {
         CLASS_NAMES[self as usize]
     }
 }
 
-/// One question about one ray, with everything that was done to answer it.
+/// One query of one ray, with all the steps of its answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Query {
-    /// What sent the ray.
+    /// Class of the ray.
     pub class: Class,
-    /// What was asked.
+    /// Question of the query.
     pub question: Question,
-    /// In the centred frame.
+    /// The ray, in the centred frame.
     pub ray: Ray,
     /// The hit behind which the search went on; [`Hit::MISS`] for other questions.
     pub after: Hit,
-    /// In order.
+    /// Steps of the walk, in order.
     pub events: Vec<Event>,
-    /// The counts of all queries together.
+    /// Counts over all steps.
     pub counts: RayCounts,
-    /// The hit; of a shadow ray that was blocked only the first `prim` found in its way.
+    /// The hit; for an occluded shadow ray, only the `prim` found first on its way.
     pub hit: Hit,
-    /// Places of the rays that came of it in [`RayTree::queries`].
+    /// Indices of the ray's children in [`RayTree::queries`].
     pub children: Vec<usize>,
-    /// The light that a shadow ray looks for, an index into the scene's lights.
+    /// Light that a shadow ray is sent to, an index into the scene's lights.
     pub light: Option<usize>,
-    /// Of a shadow ray: whether it leads only up to where one begins that starts above its surface.
+    /// Whether a shadow ray leads only to the origin of another one, which starts above its surface.
     pub riser: bool,
 }
 
-/// Everything that was asked for one sample of a pixel.
+/// All queries for one sample of a pixel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RayTree {
-    /// The eye ray first. A parent comes before its children.
+    /// Queries, that of the eye ray first. A parent comes before its children.
     pub queries: Vec<Query>,
     /// Linear colour of the sample, without the background.
     pub radiance: Vec3,
@@ -88,8 +88,8 @@ pub struct RayTree {
     pub depth: u32,
 }
 
-/// Traces one sample (counted from 0) of the pixel in column x and row y, of [`super::Settings::samples`] in each; `None`:
-/// there is no such pixel or sample.
+/// Traces one sample (counted from 0) of the pixel in column x and row y, with [`super::Settings::samples`] samples in each;
+/// `None` if there is no such pixel or sample.
 pub fn tell(job: &Job, pixel: (u32, u32), sample: u32) -> Option<RayTree> {
     let settings = &job.settings.fixed();
     let context = Context::new(job.scene, job.world, job.textures, settings);
@@ -116,21 +116,21 @@ pub fn tell(job: &Job, pixel: (u32, u32), sample: u32) -> Option<RayTree> {
     Some(RayTree { queries: sorted, radiance: seen.radiance, through: seen.through, depth: context.depth })
 }
 
-/// All queries, class by class in the order they were asked.
+/// All queries, class by class in the order in which they were asked.
 fn gather(told: ByClass<Listener>) -> Vec<Query> {
     let ByClass { primary, shadow, reflected, refracted } = told;
     let listeners = Class::ALL.into_iter().zip([primary, shadow, reflected, refracted]);
     listeners.flat_map(|(class, l)| l.queries.into_iter().map(move |q| Query { class, ..q })).collect()
 }
 
-/// The query that query `i` came of; `None` for the eye's.
+/// Index of the parent of query `i`; `None` for the eye ray's.
 fn parent(job: &Job, queries: &[Query], i: usize) -> Option<usize> {
     let query = &queries[i];
     let same_ray = |q: &Query| q.ray == query.ray;
     match query.question {
-        // Behind a hit; the class may have changed on the way.
+        // Continues behind a hit; the class may have changed on the way.
         Question::Next => queries.iter().position(|q| same_ray(q) && q.hit.bits() == query.after.bits()),
-        // What lets light through is walked through where nothing stops it.
+        // Shadow rays walk through transmitting surfaces once nothing is found to stop them.
         Question::Closest if query.class == Class::Shadow => {
             queries.iter().position(|q| same_ray(q) && q.question == Question::Occluded)
         }
@@ -140,22 +140,22 @@ fn parent(job: &Job, queries: &[Query], i: usize) -> Option<usize> {
                 let could = |(k, q): &(usize, &Query)| *k != i && q.class != Class::Shadow && q.hit.is_some();
                 queries.iter().enumerate().filter(could).map(|(k, q)| (k, job.world.refine(&q.ray, &q.hit)))
             };
-            // What goes through a flat surface starts before it.
+            // A ray through a flat surface starts before it.
             let before = |s: &Refined, ray: &Ray| query.class == Class::Refracted && s.origin(-ray.dir) == ray.origin;
             let starts = |s: &Refined, ray: &Ray| s.origin(ray.dir) == ray.origin || before(s, ray);
             let left_by = |ray: &Ray| surfaces().find(|(_, s)| starts(s, ray)).map(|(k, _)| k);
-            // Some start above their surface, where another ray leads.
+            // Some shadow rays start above their surface, at the end of another ray.
             let riser = || queries.iter().find(|q| raised(std::slice::from_ref(query), q).is_some());
             let off = |surface: &Refined| (surface.start - query.ray.origin).length_squared();
             let nearest = || surfaces().min_by(|(_, a), (_, b)| off(a).total_cmp(&off(b))).map(|(k, _)| k);
-            // Nothing comes of a shadow ray, so that whatever it is given to makes no circle.
+            // A shadow ray has no children, so whatever parent it is given, no cycle arises.
             let otherwise = || if query.class == Class::Shadow { nearest() } else { None };
             left_by(&query.ray).or_else(|| left_by(&riser()?.ray)).or_else(otherwise)
         }
     }
 }
 
-/// The one of these rays that starts above its surface, where this one leads up to.
+/// Returns the shadow ray that starts above its surface, where `riser` ends.
 fn raised(queries: &[Query], riser: &Query) -> Option<Ray> {
     let Ray { origin, dir, t_max, .. } = riser.ray;
     let asks = |q: &Query| q.class == Class::Shadow && q.question == Question::Occluded;
@@ -163,7 +163,7 @@ fn raised(queries: &[Query], riser: &Query) -> Option<Ray> {
     queries.iter().find(|q| rises && asks(q) && q.ray.origin == origin + dir && q.ray != riser.ray).map(|q| q.ray)
 }
 
-/// The queries in an order in which each comes behind its parent, the descendants of one before the next.
+/// Order of the queries in which each comes after its parent, with all descendants of one before the next.
 fn from_the_root(parents: &[Option<usize>]) -> Vec<usize> {
     let children = |of: Option<usize>| (0..parents.len()).rev().filter(move |&i| parents[i] == of);
     let mut waiting: Vec<usize> = children(None).collect();
@@ -175,7 +175,7 @@ fn from_the_root(parents: &[Option<usize>]) -> Vec<usize> {
     order
 }
 
-/// The light that a shadow ray goes to.
+/// Light that a shadow ray is sent to.
 fn light(context: &Context, ray: &Ray) -> Option<usize> {
     let towards = |light: &super::shade::LocalLight| {
         let incident = light.incident(ray.origin)?;
@@ -184,7 +184,7 @@ fn light(context: &Context, ray: &Ray) -> Option<usize> {
     context.lights.iter().position(|light| light.shadows && towards(light) == Some(true))
 }
 
-/// Writes down what the rays of one class do.
+/// Records the walks of the rays of one class.
 #[derive(Debug, Default)]
 struct Listener {
     queries: Vec<Query>,
@@ -283,7 +283,7 @@ impl Observer for Listener {
     }
 }
 
-/// What blocked a shadow ray: the test that hit.
+/// Returns the hit that blocked a shadow ray: the test that succeeded.
 fn blocker(events: &[Event]) -> Option<Hit> {
     events.iter().find_map(|event| match event {
         Event::Test(Test { prim, t, outcome }) if *outcome == Outcome::Hit => {

@@ -1,5 +1,5 @@
-//! Branches of little weight, and shadow rays of little light, go on by chance in pixels that need many samples, and carry then
-//! what all of their kind would.
+//! Russian roulette: in pixels that need many samples, branches of little weight and shadow rays of little light go on at random,
+//! and the survivors carry the weight of all.
 
 use super::draws::{Draws, Purpose, Stream};
 use super::sampling::Stochastic;
@@ -7,42 +7,43 @@ use super::sobol::mix;
 use super::wave::Path;
 use crate::math::Vec3;
 
-/// What the samples of a round share: J. Arvo, D. Kirk, *Particle Transport and Image Synthesis* (1990).
+/// Roulette for the samples of a round: J. Arvo, D. Kirk, *Particle Transport and Image Synthesis* (1990).
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Roulette {
-    /// Branches of this weight go on in any case, of half of it in half of all cases.
+    /// Branches of at least this weight always go on; of half this weight, half of them.
     least: f32,
 }
 
 impl Roulette {
-    /// In pixels that are not certain yet after so many samples.
+    /// Roulette in pixels that are still uncertain after `samples` samples.
     ///
-    /// A branch of weight w that goes on with the probability w ÷ τ adds up to w τ to the variance of a sample, its light being
-    /// 1 at most. With τ proportional to the samples that a pixel has, and to the square of what it may be wrong by, that is
-    /// the same small part of the variance that its mean may have, however many samples that takes.
+    /// A branch of weight w that goes on with probability w ÷ τ adds up to w τ to the variance of a sample, if its light is 1 at
+    /// most. With τ proportional to the samples of the pixel, and to the square of its allowed error, that is the same small part
+    /// of the variance allowed for its mean, however many samples that takes.
     pub(super) fn after(samples: u32, how: &Stochastic) -> Self {
-        /// Of the square of the error, for each sample: the mean squared error of two pictures with glass grew by 1.0 and 1.3 %,
-        /// with 2 that of three by 2.6 to 5.8 %.
+        /// Fraction of the squared error, for each sample: the mean squared error of two pictures with glass grew by 1.0 % and
+        /// 1.3 %; with 2, that of three by 2.6 to 5.8 %.
         const PART: f32 = 0.75;
-        /// So that what is bright by more than 1 is not carried by a few.
+        /// Upper limit, so that light far above 1 is not carried by a few branches.
         const MOST: f32 = 0.125;
         Self { least: (PART * how.error * how.error * samples as f32).min(MOST) }
     }
 
-    /// Whether a branch goes on; then its path has the weight that it carries. What runs straight on always does: of a sample
-    /// that shows nothing of the background it is not known whether something solid or glass stood before it.
+    /// Whether a branch goes on; if so, its path gets the weight that it carries. Straight paths always go on: for a sample that
+    /// shows no background, it would be unknown whether something solid or glass stood before it.
     #[inline(always)]
     pub(super) fn spin(self, streams: &[Stream], sample: u32, path: &mut Path) -> bool {
         self.least == 0.0 || path.straight || self.decide(streams, sample, path)
     }
 
-    /// Whether anything ends by chance.
+    /// Whether any branch may end at random.
     #[inline(always)]
     pub(super) fn is_at_work(self) -> bool {
         self.least > 0.0
     }
 
-    /// Whether the shadow ray to light `number` is sent from a point of `path`; `radiance` becomes what it carries then.
+    /// Whether a shadow ray is sent; if so, `radiance` becomes what it carries. The ray goes to light `number` from a point of
+    /// this branch.
     #[inline(always)]
     pub(super) fn sends(self, streams: &[Stream], sample: u32, path: &Path, number: u32, radiance: &mut Vec3) -> bool {
         let least = self.least * path.part;
@@ -110,7 +111,7 @@ mod tests {
             let mean = sent.iter().sum::<Vec3>() / 1024.0;
             assert!((mean.x - light).abs() < 1e-3 * carried, "{light}: {mean}");
         }
-        // What is spread over several rays is judged together, and lights by themselves.
+        // Rays of one spread are judged together, and lights separately.
         let sends = |part, number, sample| {
             let path = Path { part, ..path(1.0, 5) };
             roulette.sends(&streams, sample, &path, number, &mut Vec3::splat(0.05))

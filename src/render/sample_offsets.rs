@@ -1,11 +1,10 @@
-//! Where in a pixel its samples lie. The same places in every pixel; nothing here is random.
+//! Positions of the samples in a pixel: the same in every pixel, and not random.
 
-/// The places of `count` samples in the unit square, (x, y) from the top left; the mean of all is the pixel's centre
-/// for square counts.
+/// Positions of `count` samples in the unit square, (x, y) from the top left; their mean is the pixel's centre for square counts.
 ///
-/// A square number of samples lies on a regular grid, row by row. Another lies on a rank-1 lattice (Korobov 1959): one
-/// sample in each of `count` columns and rows, the rows stepped by the number nearest `count` over the golden ratio
-/// that has no divisor in common with it, which keeps any two samples apart.
+/// A square number of samples lies on a regular grid, row by row. Any other number lies on a rank-1 lattice (Korobov 1959): one
+/// sample in each of `count` columns and rows, with a row step of the number nearest `count` over the golden ratio that is
+/// coprime to it, which keeps any two samples apart.
 pub(crate) fn sample_offsets(count: u32) -> Vec<(f64, f64)> {
     let count = count.max(1);
     let side = (1..).take_while(|i: &u64| i * i <= u64::from(count)).last().unwrap_or(1);

@@ -1,54 +1,54 @@
-//! How a picture is sampled: how many rays a pixel gets, where in it they lie, and when they are enough.
+//! Sampling of a picture: the number of rays of a pixel, their positions in it, and when they are enough.
 
 use crate::image::ToneMap;
 use crate::named::names;
 
-/// Which rays a pixel gets.
+/// How many rays a pixel gets, and where.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Sampling {
-    /// [`super::Settings::samples`] at the same places in every pixel; of 1 in its middle.
+    /// [`super::Settings::samples`] rays at the same positions in every pixel; a single one in its centre.
     #[default]
     Uniform,
-    /// Its corners and its middle, and more where these differ.
+    /// Rays through the pixel's corners and centre, and more where these differ.
     Adaptive(Adaptive),
-    /// Random ones until their mean is certain.
+    /// Rays at random positions until their mean is certain.
     Stochastic(Stochastic),
 }
 
-/// Five rays in a square, the corners shared with the squares beside it; a quadrant that is worth it becomes a square of its
-/// own (T. Whitted, "An Improved Illumination Model for Shaded Display", 1980). What lies between the first rays of a pixel and
-/// of those beside it is missed.
+/// Five rays in a square, the corners shared with adjacent squares; a quadrant that is worth it becomes a square of its own (T.
+/// Whitted, "An Improved Illumination Model for Shaded Display", 1980). Details that fall between the first rays of adjacent
+/// pixels are missed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adaptive {
     /// Which quadrants are split.
     pub split: Split,
-    /// What they are split above, as that says.
+    /// Threshold above which quadrants are split, as defined by [`Split`].
     pub threshold: f32,
-    /// How often a pixel's side is halved at most; at most [`Adaptive::MAX_LEVELS`].
+    /// Most times that a pixel's side is halved; at most [`Adaptive::MAX_LEVELS`].
     pub levels: u32,
-    /// How often it is halved in any case; `levels` when that is less.
+    /// Number of times that the side is halved in any case; `levels` if that is less.
     pub min_levels: u32,
-    /// In which numbers effects are counted; corners are compared in linear light after this exposure.
+    /// Space in which effects are measured; corners are compared in linear light after its exposure.
     pub space: ErrorSpace,
 }
 
 /// Which quadrants of a square are split.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Split {
-    /// Those whose corner differs from the middle of the square: a channel, linear light after exposure, by more than the
-    /// threshold. As the algorithm was published.
+    /// Quadrants whose corner differs from the centre of the square, in any channel of linear light after exposure, by more than
+    /// the threshold: the algorithm as published.
     Corners,
-    /// Those in which the points that were traced on the border, by neighbours too, lie so far apart that the value of
-    /// the pixel would be written by more than the threshold differently, were the quadrant as the one or as the other.
+    /// Quadrants whose traced border points, those of neighbours included, lie so far apart that the written value of the pixel
+    /// would differ by more than the threshold if the whole quadrant were as the one or as the other.
     #[default]
     Effect,
 }
 
 impl Adaptive {
-    /// A square of the last level is the 256th part of a pixel's side.
+    /// A square of the last level has a side of 1/256 of a pixel's.
     pub const MAX_LEVELS: u32 = 8;
 
-    /// What is usual where quadrants are split so.
+    /// Usual settings for this rule of splitting.
     pub fn usual(split: Split) -> Self {
         let space = ErrorSpace::default();
         match split {
@@ -64,34 +64,34 @@ impl Default for Adaptive {
     }
 }
 
-/// Rays at random places, added in rounds until the mean of a pixel is certain.
+/// Rays at random positions, added in rounds until the mean of a pixel is certain.
 ///
 /// R. L. Cook, T. Porter, L. Carpenter, "Distributed Ray Tracing" (1984); M. A. Z. Dippé, E. H. Wold, "Antialiasing Through
-/// Stochastic Sampling" (1985). With the same numbers area lights, rough surfaces and lenses are sampled.
+/// Stochastic Sampling" (1985). The same random numbers sample area lights, rough surfaces and lenses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stochastic {
-    /// What a pixel may be wrong by, the root of the mean squared error of its channels, each 0…1 after development.
+    /// Allowed error of a pixel: the root of the mean squared error of its channels, each 0…1 after development.
     pub error: f32,
-    /// How certain that is to be: a probability in 0.5…0.9999.
+    /// Probability that the error is no larger than that, 0.5…0.9999.
     pub confidence: f64,
-    /// Rays of a pixel when all of them and its neighbours' agree, at least 1; raised to a power of two. From less than 4 on a
-    /// pixel gets 4 wherever they do not look the same.
+    /// Fewest rays of a pixel, taken when they and those of its neighbours all agree, at least 1; raised to a power of two. If it
+    /// is less than 4, a pixel gets 4 wherever they do not look the same.
     pub min_samples: u32,
-    /// Rays of a pixel at most; lowered to a power of two.
+    /// Most rays of a pixel; lowered to a power of two.
     pub max_samples: u32,
-    /// Each ray is as sharp as one of so many in a pixel; `None`: of the most of them.
+    /// Each ray is as sharp as one of this many in a pixel; `None`: as one of `max_samples`.
     pub sharpness: Option<u32>,
-    /// Weights of the places in and around a pixel.
+    /// Weights of positions in and around a pixel.
     pub filter: Filter,
-    /// In which numbers errors are counted.
+    /// Space in which errors are measured.
     pub space: ErrorSpace,
-    /// What the whole picture may be wrong by, the root of its mean squared error in these numbers. With it, `error` is found
-    /// so that the picture is just as exact as that.
+    /// Allowed error of the whole picture, the root of its mean squared error in this space. If given, `error` is chosen so that
+    /// the picture just meets it.
     pub target: Option<f32>,
 }
 
 impl Stochastic {
-    /// Fewest and most samples of a pixel as they are taken, powers of two.
+    /// Fewest and most samples of a pixel, rounded to powers of two.
     pub(super) fn powers(&self) -> (u32, u32) {
         let most = 1 << self.max_samples.max(1).ilog2();
         let fewest = self.min_samples.max(1).checked_next_power_of_two().unwrap_or(most);
@@ -105,32 +105,32 @@ impl Default for Stochastic {
     }
 }
 
-/// Weight of a place by its distance from a pixel's middle, on each axis.
+/// Weight of a position by its distance from a pixel's centre, on each axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Filter {
-    /// All of the pixel alike, nothing outside.
+    /// Constant within the pixel, zero outside.
     #[default]
     Box,
-    /// Falls to nothing at the middle of the next pixel.
+    /// Falls linearly to zero at the centre of the next pixel.
     Tent,
 }
 
-/// The numbers in which errors are counted.
+/// Space in which errors are measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ErrorSpace {
-    /// Linear light as it is stored in an EXR.
+    /// Linear light, as stored in an EXR.
     Linear,
     /// sRGB codes 0…1 of the developed picture.
     Display {
         /// Curve from scene light to display light.
         tone_map: ToneMap,
-        /// Stops of brightening before that.
+        /// Stops of exposure before that.
         exposure: f32,
     },
 }
 
 impl ErrorSpace {
-    /// By how much light is multiplied before errors are counted.
+    /// Factor applied to light before errors are measured.
     pub(super) fn gain(self) -> f32 {
         match self {
             Self::Linear => 1.0,
@@ -145,10 +145,10 @@ impl Default for ErrorSpace {
     }
 }
 
-/// How good a stochastic picture is to be, in a word.
+/// Quality of a stochastic picture, in a word.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quality {
-    /// To see whether it is what was meant.
+    /// To check that the picture is the intended one.
     Draft,
     /// To look at.
     #[default]
@@ -158,8 +158,8 @@ pub enum Quality {
 }
 
 impl Quality {
-    /// Root mean square error of a picture that is good enough for the purpose, codes 0..=1: about five, two and a half and
-    /// one of 255 steps.
+    /// Root mean square error of a picture that is good enough for the purpose, codes 0..=1: about five, two and a half and one
+    /// of 255 steps.
     pub const fn good_enough(self) -> f64 {
         match self {
             Self::Draft => 0.02,
@@ -168,8 +168,8 @@ impl Quality {
         }
     }
 
-    /// What the word stands for: what comes below [`Quality::good_enough`] on models with textures, fine alpha, tinted glass
-    /// and metal. Clear glass is just at that for a final picture; thin wires before a far pattern need the next word.
+    /// Settings for this quality: they stay below [`Quality::good_enough`] on models with textures, fine alpha, tinted glass and
+    /// metal. Clear glass just reaches it in a final picture; thin wires before a distant pattern need the next quality.
     pub fn stochastic(self) -> Stochastic {
         let (error, min_samples, max_samples) = match self {
             Self::Draft => (0.25, 1, 64),
@@ -189,80 +189,79 @@ impl Quality {
     }
 }
 
-/// What came of the sampling of a picture.
+/// Statistics of the sampling of a picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sampled {
-    /// Pixels of the picture.
+    /// Number of pixels of the picture.
     pub pixels: u64,
-    /// Eye rays of each pixel, row by row; rays that pixels share count for each of them. Empty where all have as many.
+    /// Eye rays of each pixel, row by row; a ray shared by pixels counts for each of them. Empty where all have the same number.
     pub counts: Vec<u32>,
-    /// Standard error of each pixel in the error space, the root of the mean over its channels; of stochastic sampling.
+    /// Standard error of each pixel in the error space, the root mean square over its channels; only in stochastic sampling.
     pub errors: Vec<f32>,
-    /// Eye rays in all.
+    /// Number of eye rays.
     pub rays: u64,
-    /// Of them those that were sent before the picture, to find what rays that are spread by chance seldom meet, and are none of
-    /// its own.
+    /// Eye rays sent before the picture, to find light that randomly spread rays seldom hit, and not part of the picture.
     pub looked: u64,
-    /// Pixels whose mean became as certain as was asked.
+    /// Number of pixels whose mean became as certain as asked.
     pub met: u64,
-    /// Pixels that were given up at the most rays allowed.
+    /// Number of pixels that were given up at the most rays allowed.
     pub at_most: u64,
-    /// Eye rays beyond what made pixels certain, by their own estimates: rays come in rounds that double.
+    /// Eye rays beyond those that made pixels certain, by their own estimates: rays come in rounds that double.
     pub spare: u64,
-    /// How near it came to the error of the whole picture that was asked for, if one was.
+    /// Outcome of a target for the error of the whole picture, if one was given.
     pub targeted: Option<Targeted>,
 }
 
-/// The error of a whole picture, the root of its mean squared error.
+/// Error of a whole picture, the root of its mean squared error, against its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Targeted {
-    /// What was asked for.
+    /// The target.
     pub target: f32,
-    /// What was expected from a part of the picture, before it was rendered.
+    /// Error predicted from a part of the picture, before it was rendered.
     pub foretold: f64,
-    /// What was estimated from all of it, by how its renderings differ; `None` of a single one.
+    /// Error estimated from the whole picture, by how its renderings differ; `None` for a single rendering.
     pub estimate: Option<f64>,
-    /// Seconds of processor time that were expected, without those for finding out.
+    /// Predicted processor time, seconds, without that of the prediction itself.
     pub foretold_cpu: f64,
-    /// What it took.
+    /// Actual processor time, seconds.
     pub cpu: f64,
 }
 
 impl Sampled {
-    /// Eye rays for each pixel on the average, whatever they were sent for; 0 without pixels.
+    /// Mean number of eye rays a pixel, whatever their purpose; 0 without pixels.
     #[expect(clippy::cast_precision_loss, reason = "a ratio")]
     pub fn mean(&self) -> f64 {
         self.rays as f64 / self.pixels.max(1) as f64
     }
 
-    /// Eye rays that the picture was made of: all but those that found out how many, or were traced again for another tile.
+    /// Eye rays that the picture is made of: all but those that were sent to plan it, or traced again for another tile.
     pub fn own(&self) -> u64 {
         let each: u64 = self.counts.iter().copied().map(u64::from).sum();
-        // Shared ones count for several pixels.
+        // Shared rays count for several pixels.
         if self.counts.is_empty() { self.rays } else { each.min(self.rays) }
     }
 
-    /// Samples of a pixel on the average; 0 without pixels.
+    /// Mean number of samples a pixel; 0 without pixels.
     #[expect(clippy::cast_precision_loss, reason = "a ratio")]
     pub fn samples(&self) -> f64 {
         self.own() as f64 / self.pixels.max(1) as f64
     }
 
-    /// Most rays of a pixel.
+    /// Most rays of any pixel.
     pub fn most(&self) -> u64 {
         self.counts.iter().copied().max().map_or_else(|| self.rays / self.pixels.max(1), u64::from)
     }
 
-    /// Root of the mean squared error of the whole picture; `None` where nothing is known of it. Where there are several
-    /// renderings it is an estimate; of one, the root of the mean squared standard error. That errs to the safe side, as samples
-    /// spread evenly are better than it knows: in thirty-four pictures it was 1.23 to 2.44 times the true error, and in one of a
-    /// shut-in room under a white sky, whose light hardly any ray finds, no more than that.
+    /// Root of the mean squared error of the whole picture; `None` if it is unknown. With several renderings it is an estimate;
+    /// with one, the root of the mean squared standard error, which errs on the safe side, as evenly spread samples are better
+    /// than it assumes: in thirty-four pictures it was 1.23 to 2.44 times the true error, and in one of a closed room under a
+    /// white sky, whose light hardly any ray finds, no more than that.
     #[expect(clippy::cast_precision_loss, reason = "a ratio")]
     pub fn rmse(&self) -> Option<f64> {
         if let Some(estimate) = self.targeted.and_then(|targeted| targeted.estimate) {
             return Some(estimate);
         }
-        // Sums side by side, none of which waits for another.
+        // Parallel sums without dependencies on each other.
         let mut sums = [0.0; 8];
         for errors in self.errors.chunks(sums.len()) {
             sums.iter_mut().zip(errors).for_each(|(sum, &error)| *sum += f64::from(error) * f64::from(error));
@@ -277,9 +276,9 @@ names!(Split, "rule for splitting", Corners => "corners", Effect => "effect");
 names!(Quality, "quality", Draft => "draft", Normal => "normal", Final => "final");
 
 impl Filter {
-    /// A place, in pixels from the pixel's upper left corner, that is drawn by this filter's weight with a number 0 ≤ u < 1.
+    /// Draws a position, in pixels from the pixel's upper left corner, by the filter's weight from a number 0 ≤ u < 1.
     ///
-    /// Places are drawn, not weighed: every sample counts the same (M. Ernst, M. Stamminger, G. Greiner, "Filter Importance
+    /// Positions are drawn, not weighted: every sample counts the same (M. Ernst, M. Stamminger, G. Greiner, "Filter Importance
     /// Sampling", 2006).
     #[inline(always)]
     pub(super) fn place(self, u: f64) -> f64 {

@@ -1,4 +1,4 @@
-//! Where faces of a mesh meet: a ray through a shared edge or corner hits every face there, but crosses one surface.
+//! Seams between faces of a mesh: a ray through a shared edge or corner hits every face there, but crosses one surface.
 
 use crate::accel::shapes::Prim;
 use crate::accel::{Hit, Ray};
@@ -8,15 +8,15 @@ use crate::math::triangle::Triangle;
 
 /// Whether `hit` is the same crossing of the same surface as `before`, the hit in front of it on the same ray.
 ///
-/// Two faces that turn the same side to a ray and share an edge, each running along it its own way, lie on different
-/// sides of that edge as the ray sees them, so it can meet both only on the edge itself. Other faces that share a corner
-/// must be met at the same distance as well: leaves of a book run along its spine the same way, and one lies over the next.
-/// A surface is of one material: what is glued to a face, or painted on it, shares corners with it and is crossed, too. Where
-/// one of two faces is seen from behind the surface is crossed twice, in and out again.
+/// Two faces that turn the same side to a ray and share an edge, which they traverse in opposite directions, lie on different
+/// sides of that edge as seen from the ray, so it can hit both only on the edge itself. Other faces that share a corner must also
+/// be hit at the same distance: leaves of a book traverse its spine in the same direction, and one lies over the next. A surface
+/// has a single material: a face glued to another, or painted on it, shares corners with it but is crossed separately. Where one
+/// of the two faces is seen from behind, the surface is crossed twice, in and out again.
 ///
-/// `face` looks prims and their materials up by their numbers.
+/// `face` returns the prim of an index, and its material.
 pub(crate) fn is_same_crossing<'a>(face: impl Fn(u32) -> (Prim<'a>, u32), ray: &Ray, before: &Hit, hit: &Hit) -> bool {
-    /// Relative difference of two distances to one corner: some roundings.
+    /// Relative difference of two distances to one corner: a few roundings.
     const ROUNDING: f32 = 32.0 * f32::EPSILON;
     if !before.is_some() || before.prim == hit.prim {
         return false;
@@ -31,9 +31,9 @@ pub(crate) fn is_same_crossing<'a>(face: impl Fn(u32) -> (Prim<'a>, u32), ray: &
     meet && a.faces(ray) == b.faces(ray)
 }
 
-/// Whether a ray that starts before the surface of `before`, which it crosses, meets it once more, no farther than the error of
-/// its start: all that is of the same material there and turns the same side to it is the same surface, however small
-/// its faces are, and however many lie in one place.
+/// Whether a ray that starts before the surface of `before`, which it crosses, hits the same surface once more within the error
+/// of its start: everything of the same material that turns the same side to the ray there is one surface, however small its
+/// faces are, and however many coincide.
 pub(crate) fn is_same_surface<'a>(face: impl Fn(u32) -> (Prim<'a>, u32), ray: &Ray, before: &Hit, hit: &Hit) -> bool {
     if !before.is_some() {
         return false;
@@ -50,7 +50,7 @@ enum Corners<'a> {
 }
 
 impl<'a> Corners<'a> {
-    /// `None` for shapes without corners.
+    /// Returns `None` for shapes without corners.
     fn of(prim: Prim<'a>) -> Option<Self> {
         match prim {
             Prim::Triangle(corners) => Some(Self::Triangle(corners)),
@@ -77,18 +77,18 @@ impl<'a> Corners<'a> {
         (0..self.len()).map(|i| self.position(i))
     }
 
-    /// Its edges, from corner to corner in turn.
+    /// Edges of the face, from corner to corner in turn.
     fn edges(&self) -> impl Iterator<Item = [Vec3; 2]> {
         let len = self.len();
         (0..len).map(move |i| [self.position(i), self.position((i + 1) % len)])
     }
 
-    /// Whether the other face lies beyond one of its edges: that edge is one of the other's, too, the other way round.
+    /// Whether the other face lies beyond an edge of this one: both have that edge, in opposite directions.
     fn continues(&self, other: &Self) -> bool {
         self.edges().any(|[p, q]| other.edges().any(|[a, b]| [b, a] == [p, q]))
     }
 
-    /// Whether the ray meets the front of the face: the sign of its area as the ray sees it, summed over a fan.
+    /// Whether the ray hits the front of the face: the sign of its projected area along the ray, summed over a fan.
     fn faces(&self, ray: &Ray) -> bool {
         let at = |i: usize| (self.position(i) - ray.origin).as_dvec3();
         let area = |i: usize| (at(i - 1) - at(0)).cross(at(i) - at(0)).dot(ray.dir.as_dvec3());
@@ -109,7 +109,7 @@ mod tests {
         Hit { t, u: 0.0, v: 0.0, prim }
     }
 
-    /// A square of two triangles, one that touches it in a corner, one far below, and others along its diagonal.
+    /// Returns a square of two triangles, one triangle that touches its corner, one far below, and others along its diagonal.
     fn shapes() -> Shapes {
         let v = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
         Shapes {
@@ -118,14 +118,14 @@ mod tests {
                 v(1.0, -1.0, 0.0),
                 v(1.0, 1.0, 0.0),
                 v(-1.0, 1.0, 0.0),
-                // The corner (1, 1) again, as meshes with seams have it.
+                // The corner (1, 1) again, as in meshes with seams.
                 v(1.0, 1.0, 0.0),
                 v(2.0, 1.0, 0.0),
                 v(1.0, 2.0, 0.0),
                 v(-1.0, -1.0, -1.0),
                 v(1.0, -1.0, -1.0),
                 v(1.0, 1.0, -1.0),
-                // Over or under the corner (1, −1).
+                // Below the corner (1, −1).
                 v(1.0, -1.0, -0.5),
             ],
             triangles: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [7, 8, 9], [0, 3, 2], [0, 10, 2], [0, 1, 2]],

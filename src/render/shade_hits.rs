@@ -1,8 +1,7 @@
-//! What rays that were traced together have hit: sorted by instance and shaded side by side where that can be, one by one
-//! elsewhere.
+//! Shading of the hits of a wave: sorted by instance and shaded side by side where possible, one by one elsewhere.
 //!
-//! Where several rays of a wave belong to one sample, they go by rank: so what a sample gathers is added in the order of its
-//! rays, whichever others are beside them.
+//! Several rays of a wave that belong to one sample are shaded in order of their ranks, so that contributions to a sample are
+//! added in the order of its rays, whatever other rays are in the wave.
 
 use super::branch::PathVertex;
 use super::context::Context;
@@ -24,15 +23,15 @@ use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
 use crate::math::simd::LANES;
 
-/// Fewer points than these leave most of a register empty, and are shaded one by one.
+/// Fewer points than this leave most of a register empty, and are shaded one by one.
 const FEW: usize = 3;
 
 /// Rays that were traced together.
 #[derive(Clone, Copy)]
 pub(crate) enum TracedRays<'a> {
-    /// From the eye: the `i`th is that of sample `i`.
+    /// Eye rays: the `i`th is that of sample `i`.
     PrimaryRays(&'a PrimaryRays),
-    /// Others of one class.
+    /// Other rays, of one class.
     Wave(RayClass, &'a Wave),
 }
 
@@ -51,7 +50,7 @@ impl<'a> TracedRays<'a> {
         }
     }
 
-    /// What the `i`th ray carries behind what it has hit, if that is a hole.
+    /// Path of the `i`th ray behind its hit, if that is a hole.
     fn path_through(self, i: usize) -> Path {
         match self {
             Self::PrimaryRays(primary_rays) => primary_rays.path(i),
@@ -59,7 +58,7 @@ impl<'a> TracedRays<'a> {
         }
     }
 
-    /// What the `i`th ray carries.
+    /// Path of the `i`th ray.
     pub(crate) fn path(self, i: usize) -> Path {
         match self {
             Self::PrimaryRays(primary_rays) => primary_rays.path(i),
@@ -67,7 +66,7 @@ impl<'a> TracedRays<'a> {
         }
     }
 
-    /// Whether a ray may see what it meets weakened.
+    /// Whether rays may have a throughput other than 1.
     pub(crate) fn has_weights(self) -> bool {
         match self {
             Self::PrimaryRays(primary_rays) => primary_rays.are_immersed(),
@@ -75,7 +74,7 @@ impl<'a> TracedRays<'a> {
         }
     }
 
-    /// Whether the `i`th ray has hit something where it has crossed another surface just before.
+    /// Whether the `i`th ray has crossed another surface at the place of its hit just before.
     fn touches(self, i: usize) -> bool {
         match self {
             Self::PrimaryRays(_) => false,
@@ -94,26 +93,26 @@ impl<'a> TracedRays<'a> {
 /// Buffers of one worker.
 #[derive(Default)]
 pub(super) struct ShadingBuffers {
-    /// Both are large: there is always one of each, but while it is at work.
+    /// Both are large: there is always one of each, taken out while in use.
     by_instance: Option<HitsByInstance>,
     batch: Option<Box<ShadingBatch>>,
-    /// Rays that met nothing and see the surroundings.
+    /// Rays that hit nothing and see the surroundings.
     missed: Vec<u32>,
     ranks: Ranks,
-    /// Points of a batch with their numbers for area lights, and how many places they draw.
+    /// Points of a batch, their random numbers for area lights, and how many points of each light they draw.
     draws: Vec<(usize, Draws, u32)>,
 }
 
-/// The rays of a wave by rank: how many of the same sample come before.
+/// Rays of a wave by rank: the number of earlier rays of the same sample.
 #[derive(Default)]
 struct Ranks {
-    /// By sample, how many of its rays have been ranked; zeros in between.
+    /// Number of rays ranked so far, by sample; all zero between calls.
     ranked: Vec<u32>,
-    /// By ray, its rank.
+    /// Rank of each ray.
     of_ray: Vec<u32>,
-    /// The rays by their ranks, and in each by their places in the wave.
+    /// The rays sorted by rank, and within a rank by index in the wave.
     rays: Vec<u32>,
-    /// Where those of each rank end.
+    /// End of each rank in `rays`.
     ends: Vec<usize>,
 }
 
@@ -134,7 +133,7 @@ impl Ranks {
             *rank += 1;
         }
         rays.iter().for_each(|ray| ranked[ray.sample as usize] = 0);
-        // From how many there are to where they begin; where they begin grows to where they end.
+        // Turns counts into starts; each start then grows to the end.
         let mut start = 0;
         for end in ends.iter_mut() {
             (*end, start) = (start, start + *end);
@@ -148,7 +147,7 @@ impl Ranks {
         }
     }
 
-    /// The rays of each rank.
+    /// Rays of each rank in turn.
     fn iter(&self) -> impl Iterator<Item = &[u32]> {
         let starts = std::iter::once(0).chain(self.ends.iter().copied());
         starts.zip(&self.ends).map(|(start, &end)| &self.rays[start..end])
@@ -156,7 +155,7 @@ impl Ranks {
 }
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
-    /// Adds what eye rays see.
+    /// Shades the hits of eye rays.
     pub(super) fn shade_primary_rays(&mut self, primary_rays: &PrimaryRays) {
         let at_a_time = self.context.points_at_a_time;
         for (start, hits) in (0..).step_by(at_a_time).zip(primary_rays.hits.chunks(at_a_time)) {
@@ -166,12 +165,12 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// Adds what some eye rays see whose hits follow each other.
+    /// Shades a run of consecutive hits of eye rays.
     fn shade_some_primary_rays(&mut self, primary_rays: &PrimaryRays, (first, hits): (u32, &[Hit])) {
         let context = self.context;
         let mut by_instance = self.sort();
         for (start, eight) in (first..).step_by(LANES).zip(hits.chunks(LANES)) {
-            // Neighbours mostly hit the same.
+            // Neighbours mostly hit the same prim.
             let first = eight[0].prim;
             let alike = eight.iter().all(|hit| hit.prim == first);
             if !(alike && eight[0].is_some() && by_instance.take(context, start, eight.len(), first)) {
@@ -196,7 +195,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// Adds what the rays of a wave see.
+    /// Shades the hits of a wave.
     pub(super) fn shade_wave(&mut self, class: RayClass, wave: &Wave) {
         let mut ranks = std::mem::take(&mut self.buffers.ranks);
         ranks.rank(&wave.rays);
@@ -207,7 +206,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         self.buffers.ranks = ranks;
     }
 
-    /// Adds what these rays of a wave see, which belong to different samples.
+    /// Shades the hits of these rays of a wave, which belong to different samples.
     fn shade_some(&mut self, (class, wave): (RayClass, &Wave), rays: &[u32]) {
         let context = self.context;
         let traced = TracedRays::Wave(class, wave);
@@ -234,7 +233,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         self.shade_by_instance(traced, by_instance);
     }
 
-    /// Whether the `i`th ray has crossed already what it has hit.
+    /// Whether the `i`th hit belongs to a surface that the ray has already crossed.
     fn is_crossed(&self, wave: &Wave, i: usize) -> bool {
         let (ray, hit) = (&wave.rays[i], &wave.hits[i]);
         let face = |prim| self.context.face(prim);
@@ -244,12 +243,12 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// Whether what lies behind a hit shows the hotspot to a path that has seen none so far.
+    /// Whether a path that skips the hotspot may see it again behind this hit.
     fn sees_hotspot_again(&self, path: &Path, hit: &Hit) -> bool {
         path.skips_hotspot && self.context.turns(&self.context.scene.materials[self.context.face(hit.prim).1 as usize])
     }
 
-    /// Shades what the `i`th ray has hit.
+    /// Shades the hit of the `i`th ray.
     fn shade_one(&mut self, traced: TracedRays, i: usize) {
         let (ray, hit) = (&traced.rays()[i], &traced.hits()[i]);
         let arrival = Arrival { ray, hit, touches: traced.touches(i) };
@@ -262,7 +261,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         by_instance
     }
 
-    /// Adds what rays that met nothing see.
+    /// Adds the surroundings seen by rays that hit nothing.
     fn see_surroundings(&mut self, traced: TracedRays) {
         let mut missed = std::mem::take(&mut self.buffers.missed);
         match traced {
@@ -284,7 +283,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         self.buffers.missed = missed;
     }
 
-    /// Shades the points that were taken, and gives the buffers back.
+    /// Shades the hits that were sorted by instance, and returns the buffers.
     fn shade_by_instance(&mut self, traced: TracedRays, by_instance: HitsByInstance) {
         let mut batch = self.buffers.batch.take().unwrap_or_default();
         for k in 0..by_instance.instances() {
@@ -301,7 +300,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         self.buffers.by_instance = Some(by_instance);
     }
 
-    /// Shades points of one instance side by side, as [`Self::shade`] does one by one.
+    /// Shades hits of one instance side by side, as [`Self::shade`] does one by one.
     fn shade_batch(
         &mut self,
         traced: TracedRays,
@@ -359,7 +358,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// Sends the ray at this place of what was traced on behind what it has hit.
+    /// Continues the ray at index `at` behind its hit.
     fn pass(&mut self, traced: TracedRays, at: usize, passed: PassThrough) {
         let (context, class) = (self.context, traced.class());
         let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
@@ -378,8 +377,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// Remembers the points of an instance, whose material is `unmapped` but for maps, that are the first surfaces of their
-    /// samples.
+    /// Records the first surfaces of samples among points of an instance, whose material without maps is `unmapped`.
     fn note_batch(&mut self, traced: TracedRays, (instance, unmapped): (u32, &Bsdf), batch: &ShadingBatch) {
         if self.firsts.is_empty() {
             return;
@@ -392,7 +390,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// Adds what the points show of their surroundings and of each light, or sends the rays that find whether it arrives.
+    /// Adds the light of the surroundings and of each light, or queues the rays that find their occlusion.
     fn show(&mut self, traced: TracedRays, constants: &MaterialConstants, batch: &mut ShadingBatch) {
         let context = self.context;
         if context.environment_needs_points() || constants.is_completed() {
@@ -424,7 +422,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         self.buffers.draws = draws;
     }
 
-    /// Leaves out points to which a light brings little, by chance.
+    /// Drops points that a light hardly reaches, at random.
     fn choose(&self, traced: TracedRays, (light, number): (&LocalLight, u32), batch: &mut ShadingBatch) {
         if !(light.shadows && self.chooses_shadow_rays()) {
             return;
@@ -434,7 +432,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         });
     }
 
-    /// Point `i` with its numbers for area lights, and how many places it draws of each.
+    /// Point `i`, its random numbers for area lights, and how many points of each light it draws.
     fn draws_for_lights(&self, traced: TracedRays, batch: &ShadingBatch, i: usize) -> (usize, Draws, u32) {
         let (context, (at, ..)) = (self.context, batch.arrival(i));
         let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
@@ -442,8 +440,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         (i, draws, context.light_rays_at(path.depth))
     }
 
-    /// Adds what points show of a light, of the `place`th that they have drawn of it, or sends rays that find whether it
-    /// arrives, `within` what is around the points.
+    /// Adds the light that points receive from a light, from the `place`th point drawn on it, or queues shadow rays; `within`
+    /// says whether these start inside of absorbing media.
     fn ask_for(
         &mut self,
         traced: TracedRays,
@@ -472,7 +470,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// Does what must be done point by point.
+    /// Calls `act` for every point by itself.
     fn each_point(
         &mut self,
         traced: TracedRays,
@@ -503,7 +501,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 }
 
-/// What finds out whether a light shines on the round surface at `hit`, one place of it if that was drawn.
+/// Shadow rays from the round surface at `hit` to a light, or to one point of it if that was drawn.
 fn shadow_rays(
     context: &Context,
     (light, drawn): (&LocalLight, Option<[f32; 2]>),

@@ -1,14 +1,14 @@
-//! The built-in studio: what rays that leave the scene see when there is no other environment.
+//! The built-in studio: the radiance of rays that leave the scene when there is no other environment.
 //!
-//! A neutral room as photographers light small things: a light dome that falls off to a darker floor and a dark backdrop,
-//! a large soft box overhead in front, a strip to the left, a panel to the right and a rim light behind. Who looks at the
-//! front of a model sees it before the backdrop, from which dark and white things stand out. Everything is a formula of
+//! A neutral room as photographers light small objects: a light dome that falls off to a darker floor and a dark backdrop, a
+//! large soft box overhead in front, a strip to the left, a panel to the right and a rim light behind. Seen from the front, a
+//! model stands before the backdrop, against which both dark and white objects are distinct. Everything is a closed form of
 //! constant time, smooth, and known at every blur, so that rough metals see the same room as mirrors:
 //!
 //! - [`radiance`]: the room itself, for mirrors.
 //! - [`backdrop`]: its walls without its lights, for the background: from whichever side a model is seen, it stands before
 //!   the wall that is behind it from the front.
-//! - [`blurred`]: the mean around a mirror direction as wide as a roughness makes it.
+//! - [`blurred`]: the mean over the lobe of a roughness around a mirror direction.
 //! - [`diffuse`]: the cosine-weighted mean over a hemisphere, from spherical harmonics up to band 4
 //!   (Ramamoorthi, Hanrahan, *An Efficient Representation for Irradiance Environment Maps*, 2001).
 //!
@@ -42,7 +42,7 @@ pub fn radiance(dir: Vec3) -> Vec3 {
     Vec3::splat(room(dir, 0.0))
 }
 
-/// What the eye sees behind a model along the unit vector `dir`.
+/// Linear radiance of the background behind a model, seen along the unit vector `dir`.
 #[inline(always)]
 pub fn backdrop(dir: Vec3) -> Vec3 {
     let dome = (HORIZON + (ZENITH - HORIZON) * dir.y) * (1.0 - BACKDROP);
@@ -76,8 +76,8 @@ const ZENITH: f32 = 0.32;
 const HORIZON: f32 = 0.29;
 const NADIR: f32 = 0.10;
 
-/// Share of the dome's light that the backdrop behind the model swallows, where its edge lies on −z, and how soft (both
-/// in direction cosines) it is.
+/// Share of the dome's light that the backdrop behind the model absorbs, the position of its edge along −z, and the softness of
+/// that edge (both in direction cosines).
 const BACKDROP: f32 = 0.6;
 const BACKDROP_FROM: f32 = 0.2;
 const BACKDROP_EDGE: f32 = 0.45;
@@ -85,23 +85,22 @@ const BACKDROP_EDGE: f32 = 0.45;
 /// Softness (in direction cosines) of the line between wall and floor.
 const FLOOR_EDGE: f32 = 0.22;
 
-/// A number of each rectangular light.
+/// One number for each rectangular light.
 type Four = [f32; 4];
 
 /// The rectangular lights: key overhead in front, left strip, right panel, rim behind.
 ///
-/// Their flat coordinates are direction cosines along `right` and `up`, which with `toward` are perpendicular unit
-/// vectors. They are rows of plain numbers so that the formulas become lanes: of the four lights of one point, or of many
-/// points.
+/// Their flat coordinates are direction cosines along `right` and `up`, which with `toward` are perpendicular unit vectors. They
+/// are stored as rows of plain numbers so that the formulas vectorise: over the four lights of one point, or over many points.
 struct SoftBoxes {
     toward: [Four; 3],
     right: [Four; 3],
     up: [Four; 3],
-    /// Half their sides.
+    /// Half the side lengths.
     half: [Four; 2],
-    /// Squared softness of their edges.
+    /// Squared softness of the edges.
     edge_squared: Four,
-    /// Radiance added in their middles.
+    /// Radiance added in the middle of each light.
     radiance: Four,
 }
 
@@ -127,14 +126,14 @@ const BOXES: SoftBoxes = SoftBoxes {
 };
 
 impl SoftBoxes {
-    /// Their light along `dir`, every edge softened by `blur` more.
+    /// Light of the boxes along `dir`, with every edge softened by a further `blur`.
     #[inline(always)]
     fn along(&self, dir: Vec3, blur: f32) -> Fraction {
         let mut lights = [Fraction { over: 0.0, under: 1.0 }; 4];
         for (k, light) in lights.iter_mut().enumerate() {
             let cosine = |axis: &[Four; 3]| dir.x * axis[0][k] + dir.y * axis[1][k] + dir.z * axis[2][k];
             let edge_squared = self.edge_squared[k] + blur * blur;
-            // The flat coordinates see the back of the room mirrored: fade it out around the edge of sight.
+            // The flat coordinates also show the back of the room, mirrored: fade it out at 90° from the light.
             let front = step(cosine(&self.toward), edge_squared.max(0.01));
             let across = slab(cosine(&self.right), self.half[0][k], edge_squared);
             let along = slab(cosine(&self.up), self.half[1][k], edge_squared);
@@ -146,11 +145,11 @@ impl SoftBoxes {
     }
 }
 
-/// The room along `dir`, blurred by a lobe of width `alpha`.
+/// Radiance of the room along `dir`, blurred by a lobe of width `alpha`.
 #[inline(always)]
 fn room(dir: Vec3, alpha: f32) -> f32 {
     let blur = SPREAD_PER_ALPHA * alpha;
-    // Walls brighten slowly to the ceiling; the floor and the wall behind are darker.
+    // Walls brighten slowly towards the ceiling; the floor and the wall behind are darker.
     let soft = |edge: f32| edge * edge + blur * blur;
     let behind = step(-dir.z - BACKDROP_FROM, soft(BACKDROP_EDGE));
     let left = behind.under - BACKDROP * behind.over;
@@ -161,8 +160,8 @@ fn room(dir: Vec3, alpha: f32) -> f32 {
     NADIR + over / under
 }
 
-/// A quotient that is not divided yet: the room is a sum of products of them, and one division does for all. What is under
-/// the line lies between 10⁻²⁶ and 10⁵ for unit vectors and widths up to one.
+/// An undivided quotient: the room is a sum of products of them, and one division serves all. The denominator lies between 10⁻²⁶
+/// and 10⁵ for unit vectors and widths up to one.
 #[derive(Clone, Copy)]
 struct Fraction {
     over: f32,
@@ -181,7 +180,7 @@ impl Fraction {
     }
 }
 
-/// A smooth step from 0 to 1 at `x` = 0, so wide: ½ + ½ x/√(1+x²), whose slow ends are like those of a rough lobe.
+/// Smooth step from 0 to 1 at `x` = 0 of the given width: ½ + ½ x/√(1+x²), whose slow ends resemble those of a rough lobe.
 #[inline(always)]
 fn step(x: f32, width_squared: f32) -> Fraction {
     let root = (width_squared + x * x).sqrt();
@@ -199,7 +198,7 @@ fn slab(x: f32, half: f32, width_squared: f32) -> Fraction {
 /// Number of harmonics: bands 0, 1, 2 and 4 (the cosine has no band 3).
 const HARMONICS: usize = 18;
 
-/// Projection of the room on the harmonics, times the cosine lobe's own factor for each band over π.
+/// Projection of the room on the harmonics, times the cosine lobe's factor for each band over π.
 #[rustfmt::skip]
 const COEFFICIENTS: [f32; HARMONICS] = [
     1.093_023_9, -0.025_455_615, 0.459_331_72, 0.170_484_75, -0.019_574_279, 0.068_199_165,
@@ -209,7 +208,7 @@ const COEFFICIENTS: [f32; HARMONICS] = [
 
 #[inline(always)]
 fn mean_over_hemisphere(normal: Vec3) -> f32 {
-    // Three sums that do not wait for each other.
+    // Three sums that do not depend on each other.
     let harmonics = harmonics(normal);
     let every_third = |first: usize| (first..HARMONICS).step_by(3).map(|i| harmonics[i] * COEFFICIENTS[i]).sum::<f32>();
     (every_third(0) + every_third(1) + every_third(2)).max(0.0)
@@ -247,7 +246,7 @@ fn harmonics(d: Vec3) -> [f32; HARMONICS] {
 mod tests {
     use super::*;
 
-    /// The sphere cut into `rows × 2·rows` cells of nearly equal size: the middle of each and its solid angle.
+    /// Cuts the sphere into `rows × 2·rows` cells: the middle of each and its solid angle.
     fn directions(rows: u32) -> impl Iterator<Item = (Vec3, f64)> {
         use std::f64::consts::PI;
         let step = PI / f64::from(rows);
@@ -269,7 +268,7 @@ mod tests {
         x as f32
     }
 
-    /// The lobes' factors over π for bands 0, 1, 2, 4, by harmonic.
+    /// Factors of the cosine lobe over π for bands 0, 1, 2, 4, by harmonic.
     fn lobe_factor(i: usize) -> f64 {
         let band = [1, 4, 9].iter().filter(|&&first| i >= first).count();
         [1.0, 2.0 / 3.0, 0.25, -1.0 / 24.0][band]
@@ -308,7 +307,7 @@ mod tests {
         directions(6).map(|(dir, _)| dir)
     }
 
-    /// The mean of the room under a weight of the direction.
+    /// Mean of the room, weighted by a function of the direction.
     fn mean(rows: u32, weight: impl Fn(Vec3) -> f64) -> f64 {
         let (mut sum, mut total) = (0.0, 0.0);
         for (dir, solid_angle) in directions(rows) {

@@ -1,11 +1,11 @@
-//! Lists that are written in place before it is known how much of what was written counts.
+//! Lists that are written in place before it is known how many of the written items count.
 
 use std::ops::{Deref, DerefMut};
 
-/// A list with room behind its end, which is left from others and costs nothing to make.
+/// A list with spare room behind its end, left over from earlier use, so that making room costs nothing.
 #[derive(Debug)]
 pub(super) struct Tail<T> {
-    /// What counts, and the room.
+    /// The items that count, and the spare room.
     items: Vec<T>,
     len: usize,
 }
@@ -17,18 +17,18 @@ impl<T> Default for Tail<T> {
 }
 
 impl<T: Copy> Tail<T> {
-    /// Room for `N` more, of which [`Self::grow`] takes those that came; `empty` is what lies there at first.
+    /// Returns room for `N` more items, of which [`Self::grow`] keeps some; new room is filled with `empty`.
     pub(super) fn room<const N: usize>(&mut self, empty: T) -> &mut [T; N] {
         let end = self.len + N;
         if self.items.len() < end {
             self.items.resize(end.next_power_of_two(), empty);
         }
-        // As many were just made sure of.
+        // The resize above has made sure of `N` items.
         let Some(room) = self.items[self.len..].first_chunk_mut() else { unreachable!("{end} are there") };
         room
     }
 
-    /// Takes the first `count` of the room, at most as many as there is.
+    /// Keeps the first `count` items of the room, at most all of it.
     pub(super) fn grow(&mut self, count: usize) {
         self.len = (self.len + count).min(self.items.len());
     }

@@ -1,8 +1,8 @@
 //! The picture in tiles: each is one unit of work for one thread, and threads take the next tile when they are done.
 //!
-//! Nothing a tile computes depends on the thread or on when others are computed, so that every number of threads gives the same
-//! bits. Where tiles tell each other what they have found, in [`adaptive`] and [`stochastic`], what is traced together does not
-//! depend on who does it.
+//! Nothing that a tile computes depends on the thread or on when other tiles are computed, so that every number of threads gives
+//! the same bits. Where tiles exchange what they have found, in [`adaptive`] and [`stochastic`], the choice of what is traced
+//! together does not depend on the thread that traces it.
 
 use super::by_class::ByClass;
 use super::context::Context;
@@ -24,10 +24,10 @@ use std::time::Duration;
 /// Columns and rows of a tile.
 pub(super) const TILE: u32 = 32;
 
-/// Columns and rows of a block of pixels, whose rays go together.
+/// Columns and rows of a block of pixels, whose rays are traced one after another.
 pub(super) const BLOCK: u32 = 4;
 
-/// Samples that are traced together at most: few enough that they and their rays stay in a processor's own cache.
+/// Most samples traced together: few enough that they and their rays stay in a core's own cache.
 pub(super) const TOGETHER: usize = 1 << 11;
 
 /// A part of the picture: pixels `x0..x1` of rows `y0..y1`.
@@ -39,16 +39,16 @@ pub(super) struct Tile {
     pub y1: u32,
 }
 
-/// What came of a tile, in the order of its places.
+/// Result of a tile, in the order of its places.
 pub(super) struct TilePixels {
     pub tile: Tile,
     pub beauty: Vec<[f32; 4]>,
     /// Background seen through coloured glass, where the frame has any.
     pub veil: Vec<[f32; 4]>,
     pub layers: Vec<LayerPixel>,
-    /// Empty where every pixel has equally many samples.
+    /// Empty where every pixel has the same number of samples.
     pub facts: Vec<PixelFacts>,
-    /// Primary rays in all.
+    /// Number of primary rays.
     pub rays: u64,
     /// Of these, the ones through pixels around the tile.
     pub rays_around: u64,
@@ -56,20 +56,20 @@ pub(super) struct TilePixels {
     pub rays_beyond: u64,
 }
 
-/// How the sampling of a pixel went.
+/// Result of the sampling of a pixel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelFacts {
-    /// Eye rays.
+    /// Number of eye rays.
     pub count: u32,
-    /// Of them those that were not needed, as far as its estimates tell.
+    /// Eye rays that were not needed, as far as the pixel's estimates show.
     pub spare: u32,
-    /// Standard error, if that was estimated.
+    /// Standard error, if it was estimated.
     pub error: f32,
     pub convergence: Convergence,
 }
 
 impl PixelFacts {
-    /// Adds what the mean is too dark by, as it is written, because no sample has met it.
+    /// Adds to the error by how much the mean is too dark, as it is written, for want of a sample that has met some light.
     pub(super) fn miss(&mut self, missed: f32) {
         if missed > 0.0 {
             self.error = (self.error * self.error + missed * missed).sqrt();
@@ -77,18 +77,18 @@ impl PixelFacts {
     }
 }
 
-/// Whether a pixel needs more samples.
+/// Outcome of the estimate of whether a pixel needs more samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Convergence {
-    /// Nothing was estimated.
+    /// No estimate was made.
     Unknown,
-    /// Its mean was certain.
+    /// The mean is certain.
     Converged,
-    /// Its mean is not certain: it goes on, or had the most that are allowed.
+    /// The mean is not certain: the pixel goes on, or had the most samples allowed.
     Open,
 }
 
-/// One way to sample a tile, whichever was chosen; `None` when cancelled.
+/// Renders a tile with the sampling that was chosen; `None` when cancelled.
 fn render_tile<A: Accel, P: Observer>(frame: &Frame, tracer: &mut Tracer<A, P>, tile: Tile) -> Option<TilePixels> {
     match &frame.settings.sampling {
         Sampling::Uniform => frame.render(tracer, tile),
@@ -97,15 +97,15 @@ fn render_tile<A: Accel, P: Observer>(frame: &Frame, tracer: &mut Tracer<A, P>, 
     }
 }
 
-/// A tile that was rendered alone.
+/// A tile that was rendered by itself.
 pub(super) struct Alone<P> {
     pub pixels: TilePixels,
-    /// Time of the processor that it took.
+    /// Processor time that the tile took.
     pub spent: Duration,
     pub counts: ByClass<P>,
 }
 
-/// Renders these tiles alone, in any order; and whether nothing was cut short.
+/// Renders each of these tiles by itself; the results are in any order. Also returns whether all were finished.
 pub(super) fn render_some<A: Accel, P: Observer>(
     context: &Context,
     accel: &A,
@@ -126,17 +126,17 @@ pub(super) fn render_some<A: Accel, P: Observer>(
     (finished, complete)
 }
 
-/// A picture of tiles that were rendered.
+/// A picture, rendered from its tiles.
 pub(crate) struct RenderedTiles<P> {
     pub picture: Picture,
     pub sampled: Sampled,
-    /// What each thread counted.
+    /// Counts of each thread.
     pub counts: Vec<ByClass<P>>,
-    /// Whether nothing was cut short by the user.
+    /// Whether every tile was finished, that is, the user did not cancel.
     pub complete: bool,
 }
 
-/// Renders every tile.
+/// Renders all tiles.
 pub(crate) fn render_tiles<A: Accel, P: Observer>(
     context: &Context,
     accel: &A,
@@ -164,14 +164,14 @@ pub(crate) fn render_tiles<A: Accel, P: Observer>(
     RenderedTiles { picture, sampled, counts, complete }
 }
 
-/// The picture, as far as it is finished, and how its pixels were sampled; the others had no rays.
+/// The picture as far as it is finished, and the sampling of its pixels; unfinished ones have no rays.
 struct Whole {
     picture: Picture,
     sampled: Sampled,
 }
 
 impl Whole {
-    /// Nothing yet.
+    /// A picture without a finished pixel.
     fn new(settings: &Settings, has_veil: bool) -> Self {
         let pixels = settings.width as usize * settings.height as usize;
         let mut sampled = Sampled { pixels: pixels as u64, ..Sampled::default() };
@@ -212,7 +212,7 @@ impl Whole {
 }
 
 impl Sampled {
-    /// Adds the rays of a tile, and how many of its pixels ended how.
+    /// Adds the rays of a tile, and counts its pixels by their end.
     fn count(&mut self, pixels: &TilePixels) {
         self.rays += pixels.rays;
         for facts in &pixels.facts {
@@ -223,7 +223,7 @@ impl Sampled {
     }
 }
 
-/// Puts something of each pixel of a row of a block into its place; of a whole row without a loop.
+/// Stores a value of each pixel of a row of a block in its place; full rows need no loop.
 #[inline(always)]
 pub(super) fn put_row<F, T>(to: &mut [T], from: &[F], of: impl Fn(&F) -> T) {
     const SIDE: usize = BLOCK as usize;
@@ -234,7 +234,7 @@ pub(super) fn put_row<F, T>(to: &mut [T], from: &[F], of: impl Fn(&F) -> T) {
     }
 }
 
-/// What is known of the sampling of each pixel, as layers.
+/// Adds what is known of the sampling of each pixel as channels of the layers.
 pub(super) fn add_channels(sampled: &Sampled, layers: &mut Layers) {
     let mut add = |name: &str, values: Values| {
         if !values.is_empty() {
@@ -245,8 +245,8 @@ pub(super) fn add_channels(sampled: &Sampled, layers: &mut Layers) {
     add("sampling.count", Values::U32(sampled.counts.clone()));
 }
 
-/// Traces every tile, so many pixels together, and gathers what `cost` makes of the observers of each of these batches:
-/// one value for each pixel, row by row. `None` when cancelled.
+/// Traces every tile, `together` pixels in a batch, and gathers what `cost` computes from the observers of each batch: one value
+/// for each pixel, row by row. `None` when cancelled.
 pub(crate) fn cost_tiles<A: Accel, P: Observer, T: Copy + Default + Send>(
     context: &Context,
     accel: &A,
@@ -278,7 +278,7 @@ pub(crate) fn cost_tiles<A: Accel, P: Observer, T: Copy + Default + Send>(
     complete.then_some(all)
 }
 
-/// Traces one sample (from 0) of one pixel; `None`: there is no such pixel or sample.
+/// Traces one sample (from 0) of one pixel; `None` if there is no such pixel or sample.
 pub(crate) fn trace_sample<A: Accel, P: Observer>(
     context: &Context,
     accel: &A,
@@ -299,25 +299,25 @@ pub(crate) fn trace_sample<A: Accel, P: Observer>(
     tracer.trace().then(|| (tracer.samples[0], tracer.counts))
 }
 
-/// Pixels that are traced together.
+/// How many pixels are traced together.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Together {
-    /// As many as fit a wave, as when rendering.
+    /// As many as fit into a wave, as in a rendering.
     Wave,
-    /// One by one.
+    /// One pixel at a time.
     Pixel,
 }
 
-/// What came of tiles that were worked on.
+/// Results of the tiles, or other pieces of work, that were traced.
 pub(super) struct TracedTiles<T, P> {
     pub finished: Vec<T>,
-    /// What each thread counted.
+    /// Counts of each thread.
     pub counts: Vec<ByClass<P>>,
-    /// Whether all were finished.
+    /// Whether all pieces were finished.
     pub complete: bool,
 }
 
-/// Has every tile, however it is told, worked on by some thread, which take them in order.
+/// Distributes all pieces of work, such as tiles, over the threads, which take them in order.
 pub(super) fn each_tile<A: Accel, P: Observer, W: Sync, T: Send>(
     context: &Context,
     accel: &A,
@@ -342,7 +342,7 @@ pub(super) fn each_tile<A: Accel, P: Observer, W: Sync, T: Send>(
     TracedTiles { finished, counts, complete }
 }
 
-/// Pixels whose samples are traced together at most.
+/// Most pixels whose samples are traced together.
 fn batch_pixels(samples: usize) -> usize {
     (TOGETHER / samples).max(1)
 }
@@ -383,12 +383,12 @@ fn empty_picture(settings: &Settings) -> Picture {
 }
 
 impl Tile {
-    /// Its pixels, block by block and row by row in each, so that rays that follow each other run alike.
+    /// Pixels of the tile, block by block and row by row in each, so that consecutive rays are coherent.
     pub(super) fn places(self) -> impl Iterator<Item = (u32, u32)> {
         self.blocks().flat_map(|Self { x0, y0, x1, y1 }| (y0..y1).flat_map(move |y| (x0..x1).map(move |x| (x, y))))
     }
 
-    /// Its blocks, whose pixels follow each other in the order of [`Self::places`].
+    /// Blocks of the tile, whose pixels follow each other in the order of [`Self::places`].
     pub(super) fn blocks(self) -> impl Iterator<Item = Self> {
         let starts = |from: u32, to: u32| (from..to).step_by(BLOCK as usize);
         starts(self.y0, self.y1).flat_map(move |y0| {
@@ -397,10 +397,10 @@ impl Tile {
         })
     }
 
-    /// Adds the columns and rows of its pixels, in the order of [`Self::places`].
+    /// Adds the columns and rows of the tile's pixels, in the order of [`Self::places`].
     pub(super) fn list(self, (x, y): (&mut Vec<u32>, &mut Vec<u32>)) {
         for block in self.blocks() {
-            // Whole blocks without a loop.
+            // Full blocks need no loop.
             if block.pixels() == (BLOCK * BLOCK) as usize {
                 x.extend_from_slice(&std::array::from_fn::<_, { (BLOCK * BLOCK) as usize }, _>(|i| {
                     block.x0 + i as u32 % BLOCK
@@ -417,7 +417,7 @@ impl Tile {
         }
     }
 
-    /// The number of a pixel of it in the order of [`Self::places`].
+    /// Index of a pixel of the tile in the order of [`Self::places`].
     pub(super) fn number(self, (x, y): (u32, u32)) -> usize {
         let (across, down) = ((x - self.x0) / BLOCK * BLOCK, (y - self.y0) / BLOCK * BLOCK);
         let rows = (self.y1 - self.y0 - down).min(BLOCK);
@@ -426,7 +426,7 @@ impl Tile {
         (before + (y - self.y0 - down) * columns + (x - self.x0 - across)) as usize
     }
 
-    /// What is left of it around a tile in it: above, below, left and right of that.
+    /// Parts of the tile around an inner tile: above, below, left and right of it.
     pub(super) fn without(self, inner: Self) -> impl Iterator<Item = Self> + Clone {
         let parts = [
             Self { y1: inner.y0, ..self },
@@ -437,8 +437,8 @@ impl Tile {
         parts.into_iter().filter(|part| part.pixels() > 0)
     }
 
-    /// Nine parts of a whole tile, row by row: its corners, a block wide and high, the sides between them and the middle.
-    /// Those of a smaller tile in which there is nothing are left out.
+    /// Nine parts of a full tile, row by row: the corners, a block wide and high, the sides between them and the middle. Empty
+    /// parts of a smaller tile are left out.
     pub(super) fn zones(self) -> impl Iterator<Item = Self> {
         let parts = |from: u32, to: u32| {
             let cuts = [from, from + BLOCK, from + TILE - BLOCK, from + TILE].map(|cut| cut.min(to));
@@ -449,12 +449,12 @@ impl Tile {
         all.filter(|zone| zone.pixels() > 0)
     }
 
-    /// Whether some pixel belongs to both.
+    /// Whether the tiles share a pixel.
     pub(super) fn meets(self, other: Self) -> bool {
         self.x0.max(other.x0) < self.x1.min(other.x1) && self.y0.max(other.y0) < self.y1.min(other.y1)
     }
 
-    /// What of it lies in another, which it meets.
+    /// Intersection with another tile; the two must share a pixel.
     pub(super) fn within(self, other: Self) -> Self {
         Self {
             x0: self.x0.max(other.x0),
@@ -464,7 +464,7 @@ impl Tile {
         }
     }
 
-    /// How many pixels it has.
+    /// Number of pixels.
     pub(super) fn pixels(self) -> usize {
         (self.x1 - self.x0) as usize * (self.y1 - self.y0) as usize
     }
@@ -473,7 +473,7 @@ impl Tile {
         (self.x0..self.x1).contains(&x) && (self.y0..self.y1).contains(&y)
     }
 
-    /// With the pixels around it that a picture of this size has.
+    /// The tile and the pixels around it, clipped to a picture of this size.
     pub(super) fn grown(self, width: u32, height: u32) -> Self {
         Self {
             x0: self.x0.saturating_sub(1),
@@ -485,7 +485,7 @@ impl Tile {
 }
 
 impl TilePixels {
-    /// Nothing yet.
+    /// A tile without results.
     pub(super) fn empty(tile: Tile) -> Self {
         Self {
             tile,
@@ -501,7 +501,7 @@ impl TilePixels {
 }
 
 impl Frame<'_> {
-    /// Renders one tile; `None` when cancelled.
+    /// Renders a tile; `None` when cancelled.
     fn render<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, tile: Tile) -> Option<TilePixels> {
         let mut done = TilePixels::empty(tile);
         let per_pixel = self.offsets.len();
@@ -517,8 +517,7 @@ impl Frame<'_> {
         Some(done)
     }
 
-    /// Traces one tile, all samples of a pixel and so many pixels together, and calls `each` after each of these batches;
-    /// `None` when cancelled.
+    /// Traces a tile, all samples of `pixels` pixels in a batch, and calls `each` after each batch; `None` when cancelled.
     fn trace<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
@@ -527,7 +526,7 @@ impl Frame<'_> {
         mut each: impl FnMut(&mut Tracer<A, P>),
     ) -> Option<()> {
         let mut places = Vec::with_capacity(tile.pixels());
-        // Nested iterators are quick from inside, and slow one after another.
+        // Nested iterators are fast with internal iteration, and slow item by item.
         tile.places().for_each(|at| places.push(at));
         for places in places.chunks(pixels) {
             tracer.reset(places.len() * self.offsets.len(), self.settings.layers, &self.media);

@@ -1,7 +1,7 @@
-//! Where the eye is and which ray each point of the picture gets.
+//! The camera: position, axes and lens, and the ray through each point of the picture.
 //!
-//! Everything is `f64` in world space; the caller moves origins into the scene's centred frame. Choosing a view for a
-//! scene is `scene::framing`'s business.
+//! Everything is `f64` in world space; the caller moves origins into the scene's centred frame. Choosing a view for a scene is up
+//! to `scene::framing`.
 //!
 //! A view fixes the *vertical* extent of what is seen. The horizontal extent follows from the picture's own width and
 //! height, so a glTF camera whose `aspectRatio` differs from the picture's keeps its vertical field of view (or `ymag`)
@@ -21,7 +21,7 @@ pub struct View {
     pub up: DVec3,
     /// Unit vector into the picture; depth (the Z layer) counts along it.
     pub forward: DVec3,
-    /// How far from the axis one sees.
+    /// Vertical extent of the view.
     pub lens: Lens,
 }
 
@@ -43,7 +43,7 @@ pub enum Lens {
 /// A ray through a point of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrimaryRay {
-    /// Start, world space.
+    /// Origin, world space.
     pub origin: DVec3,
     /// Unit direction, world space.
     pub dir: DVec3,
@@ -53,7 +53,7 @@ pub struct PrimaryRay {
     pub cone_spread: f32,
 }
 
-/// Half the field of view stays this far inside 0…90°, so that a careless file still gives a picture.
+/// Range of half the field of view, radians: just inside 0…90°, so that careless values in a file still give a picture.
 const HALF_FOV: (f64, f64) = (1e-4, 1.57);
 
 impl Lens {
@@ -63,7 +63,7 @@ impl Lens {
         Self::Perspective { half_height: libm::tan(half.clamp(HALF_FOV.0, HALF_FOV.1)) }
     }
 
-    /// Parallel rays over `height` world units; a height that is not positive counts as 1.
+    /// Parallel rays over `height` world units; a height that is not positive and finite counts as 1.
     pub fn orthographic(height: f64) -> Self {
         let height = if height.is_finite() && height > 0.0 { height } else { 1.0 };
         Self::Orthographic { half_height: height * 0.5 }
@@ -71,8 +71,8 @@ impl Lens {
 }
 
 impl View {
-    /// A camera of a file. Scale in its transform is ignored, as glTF says; a transform without three independent axes
-    /// counts as unturned.
+    /// The view of a camera in a file. Scale in its transform is ignored, as glTF demands; a transform without three independent
+    /// axes counts as the identity rotation.
     pub fn from_camera(camera: &Camera) -> Self {
         let DAffine3 { matrix3, translation } = camera.world_from_camera;
         let axes = orthonormal(&matrix3);
@@ -83,14 +83,14 @@ impl View {
         Self { eye: translation, right: axes.x_axis, up: axes.y_axis, forward: -axes.z_axis, lens }
     }
 
-    /// From `eye` towards `at`, with the picture's top as close to `up` as can be.
+    /// The view from `eye` towards `at`, with the picture's top as close to `up` as possible.
     ///
-    /// When `at` is the eye it looks along −z; when `up` points along the view, another axis stands in for it.
+    /// If `at` is the eye, the view is along −z; if `up` is parallel to the view, another axis stands in for it.
     pub fn look_at(eye: DVec3, at: DVec3, up: DVec3, lens: Lens) -> Self {
         Self::look_along(eye, at - eye, up, lens)
     }
 
-    /// From `eye` along `direction` (any length); otherwise as [`View::look_at`].
+    /// The view from `eye` along `direction` (any length); otherwise as [`View::look_at`].
     pub fn look_along(eye: DVec3, direction: DVec3, up: DVec3, lens: Lens) -> Self {
         let forward = direction.try_normalize().unwrap_or(DVec3::NEG_Z);
         let upright = |up: DVec3| {
@@ -110,7 +110,7 @@ impl View {
         match self.lens {
             Lens::Perspective { half_height } => {
                 let to_film = (self.right * film.x + self.up * film.y) * half_height + self.forward;
-                // One division for all four.
+                // One division serves all four results.
                 let nearness = 1.0 / to_film.length();
                 PrimaryRay {
                     origin: self.eye,
@@ -128,8 +128,8 @@ impl View {
         }
     }
 
-    /// Where `point` appears: x to the right and y up in half picture heights from the centre, and its depth along the
-    /// view axis. With a perspective lens x and y mean nothing for a depth that is not positive.
+    /// Projects `point`: x to the right and y up in half picture heights from the centre, and its depth along the view axis. With
+    /// a perspective lens x and y are meaningless unless the depth is positive.
     pub fn project(&self, point: DVec3) -> DVec3 {
         let p = point - self.eye;
         let (x, y, depth) = (p.dot(self.right), p.dot(self.up), p.dot(self.forward));
@@ -142,7 +142,7 @@ impl View {
     }
 }
 
-/// The axes of `m` made unit and perpendicular, z first: a camera is known by where it looks.
+/// The axes of `m` made orthonormal, z first: the view direction matters most.
 fn orthonormal(m: &DMat3) -> DMat3 {
     let Some(z) = m.z_axis.try_normalize() else { return DMat3::IDENTITY };
     let Some(x) = m.y_axis.cross(z).try_normalize() else { return DMat3::IDENTITY };
@@ -178,7 +178,7 @@ mod tests {
         let view = square(Lens::perspective(FRAC_PI_2));
         let top = view.primary(8.0, 0.0, 16, 8).dir;
         assert!(close(top, DVec3::new(0.0, 1.0, -1.0).normalize()), "{top}");
-        // Twice as wide as high: the vertical field stays, the horizontal one grows.
+        // Twice as wide as high: the vertical field of view stays, the horizontal one grows.
         let right = view.primary(16.0, 4.0, 16, 8).dir;
         assert!(close(right, DVec3::new(2.0, 0.0, -1.0).normalize()), "{right}");
     }

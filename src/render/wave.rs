@@ -1,4 +1,4 @@
-//! Rays on their way: what a ray carries besides its geometry, and the queues that turn trees of rays into waves.
+//! Rays in flight: the path state of a ray besides its geometry, and the queues that turn ray trees into waves.
 //!
 //! There is no recursion and no allocation per ray: shading pushes children into queues, and each queue is drained in
 //! slices of rays of one class. The queues are buffers of one worker, reused from tile to tile.
@@ -8,56 +8,56 @@ use super::sobol::mix;
 use crate::accel::{Hit, Ray};
 use crate::math::Vec3;
 
-/// Why a ray was sent; counts are kept apart by class.
+/// Kind of a ray; counts are kept apart by class.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RayClass {
-    /// From the eye.
+    /// Eye ray.
     Primary,
-    /// Off a surface.
+    /// Ray reflected by a surface.
     Reflected,
-    /// Bent by a surface, or passed straight through it.
+    /// Ray refracted by a surface, or passed straight through it.
     Refracted,
 }
 
 impl RayClass {
-    /// In the order in which queues are drained.
+    /// All classes, in the order in which queues are drained.
     pub(crate) const ALL: [Self; 3] = [Self::Primary, Self::Reflected, Self::Refracted];
 }
 
-/// What a ray carries besides its geometry; the sample it belongs to is in [`Ray::sample`].
+/// State of a ray besides its geometry; the sample it belongs to is in [`Ray::sample`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Path {
-    /// Product of the weights from the eye to here.
+    /// Throughput: the product of the weights from the eye to here.
     pub weight: Vec3,
-    /// 1/N where this is one of N rays that a branch was spread over: whether the branch is worth its rays is judged by what all
-    /// of them carry together.
+    /// 1/N if this is one of N rays over which a branch was spread: whether the branch is worth tracing is decided by the weight
+    /// of all of them together.
     pub part: f32,
     /// Bounces since the eye.
     pub depth: u32,
-    /// Whether the ray still runs along the line of sight, so that what lies behind shows through.
+    /// Whether the ray still runs along the line of sight, so that the background behind shows through.
     pub straight: bool,
-    /// Whether the hotspot of the sky was sampled where this ray was spread, so that the ray itself must not count it again.
+    /// Whether the hotspot of the sky was sampled where this ray was spread, so that the ray must not count it again.
     pub skips_hotspot: bool,
-    /// Of a ray that goes on behind a hit, the surface it crossed last, unless that was a hole; [`Hit::MISS`]: none.
+    /// Last surface that the ray crossed, unless it was a hole, for a ray that goes on behind a hit; [`Hit::MISS`]: none.
     pub crossed: Hit,
-    /// The part of the spectrum this ray carries, once dispersion has split it.
+    /// Band of the spectrum that the ray carries, once dispersion has split it.
     pub band: Option<u8>,
-    /// What the ray is inside of.
+    /// Media that the ray is inside of.
     pub media: Media,
-    /// Absorption has been applied to the weight up to this t of the ray.
+    /// Ray parameter t up to which absorption has been applied to the weight.
     pub since: f32,
-    /// Width of the cone around the ray at its start: the part of the picture it stands for.
+    /// Width of the ray's cone at its start: its footprint.
     pub cone_width: f32,
-    /// Growth of that width for each unit of length.
+    /// Growth of that width per unit of length.
     pub cone_spread: f32,
     /// The part of that growth, radians, that is due to rough surfaces.
     pub scattered: f32,
-    /// Which way through the tree of rays led here: the same number in all samples for the same turns.
+    /// Hash of the turns through the ray tree that led here: the same in all samples for the same turns.
     pub branch: u32,
 }
 
 impl Path {
-    /// The path of a ray from the eye, inside of `media`.
+    /// The path of a eye ray inside of `media`.
     pub(crate) fn from_eye(cone_width: f32, cone_spread: f32, media: Media) -> Self {
         Self {
             weight: Vec3::ONE,
@@ -76,28 +76,28 @@ impl Path {
         }
     }
 
-    /// The path behind the back of a one-sided face, which no ray sees, but which is in the way of rays to the hotspot.
+    /// The path behind the back of a one-sided face, which is invisible but blocks rays to the hotspot.
     pub(crate) fn behind_back(self) -> Self {
         Self { skips_hotspot: false, ..self }
     }
 
-    /// The path after a turn that no other ray from this point takes.
+    /// The path after a turn; no other ray from this point has the same class and number.
     pub(crate) fn turned(self, class: RayClass, number: u32) -> Self {
         Self { branch: mix(self.branch, (number << 2) | class as u32), ..self }
     }
 }
 
-/// Rays of one class that wait to be traced.
+/// Rays of one class that are waiting to be traced.
 #[derive(Debug, Default)]
 pub(crate) struct Queue {
     rays: Vec<Ray>,
     paths: Vec<Path>,
-    /// Of a continuing ray: the last hit; the search resumes behind it. Of a new ray: the hit it left, with `t` as far as it may
-    /// meet the same surface again; [`Hit::MISS`] if it may not.
+    /// For a continuing ray, the last hit: the search resumes behind it. For a new ray, the hit it left, with `t` the distance
+    /// within which it may hit the same surface again; [`Hit::MISS`] if it may not.
     after: Vec<Hit>,
-    /// So many at the front are in the order of their samples.
+    /// Number of rays at the front that are sorted by sample.
     in_order: usize,
-    /// Samples of others, and where their rays are: a buffer.
+    /// Samples and positions of the rays to be sorted: a buffer.
     order: Vec<(u32, u32)>,
 }
 
@@ -106,33 +106,33 @@ impl Queue {
         self.rays.is_empty()
     }
 
-    /// Rays that wait.
+    /// Number of queued rays.
     pub(crate) fn len(&self) -> usize {
         self.rays.len()
     }
 
-    /// What the rays that wait carry.
+    /// Paths of the queued rays.
     pub(crate) fn paths_mut(&mut self) -> &mut [Path] {
         &mut self.paths
     }
 
-    /// Adds a ray, which goes on behind `after` or starts there.
+    /// Adds a ray that goes on behind `after`, or starts at it.
     pub(crate) fn push(&mut self, ray: Ray, path: Path, after: Hit) {
         self.rays.push(ray);
         self.paths.push(path);
         self.after.push(after);
     }
 
-    /// Adds a ray that goes on behind a hit, where something was. Behind a hole it has crossed what it had before.
+    /// Adds a ray that goes on behind a hit that was not a hole. (Behind a hole, the surface crossed last stays the same.)
     pub(crate) fn push_behind(&mut self, ray: Ray, path: Path, hit: Hit) {
         self.push(ray, Path { crossed: hit, ..path }, hit);
     }
 
     /// Moves the last rays, at most `limit`, into `wave`.
     ///
-    /// Taking from the end bounds the memory that trees with many branches need: a slice is traced down to its leaves
-    /// before the rays in front of it. More than `sort_above` rays are put in the order of their samples before, so that where
-    /// they are cut does not depend on the order in which points were shaded.
+    /// Taking from the end bounds the memory that trees with many branches need: a slice is traced down to its leaves before the
+    /// rays in front of it. More than `sort_above` rays are sorted by sample first, so that the cut between waves does not depend
+    /// on the order in which points were shaded.
     pub(crate) fn take(&mut self, wave: &mut Wave, (limit, sort_above): (usize, usize)) {
         wave.clear();
         if self.rays.len() > sort_above {
@@ -146,8 +146,7 @@ impl Queue {
         wave.hits.resize(wave.rays.len(), Hit::MISS);
     }
 
-    /// Puts all rays in the order of their samples, those of one sample in the order in which they came. `spare` is empty
-    /// before and after.
+    /// Sorts all rays by sample; rays of one sample keep their order. `spare` is empty before and after.
     fn put_in_order(&mut self, spare: &mut Wave) {
         let Self { rays, paths, after, in_order, order } = self;
         let (before, added) = rays.split_at(*in_order);
@@ -173,17 +172,17 @@ impl Queue {
     }
 }
 
-/// Puts items in an order, which says where each comes from.
+/// Permutes items by `order`, which gives the source position of each.
 fn reorder<T: Copy>(items: &mut [T], order: &[(u32, u32)], spare: &mut Vec<T>) {
     spare.extend(order.iter().map(|&(_, from)| items[from as usize]));
     items.copy_from_slice(spare);
     spare.clear();
 }
 
-/// Rays of one class that are traced together, and what they hit.
+/// Rays of one class that are traced together, and their hits.
 #[derive(Debug, Default)]
 pub(crate) struct Wave {
-    /// Whether they start, and do not go on.
+    /// Whether the rays are new, as opposed to continuing behind a hit.
     pub starts: bool,
     pub rays: Vec<Ray>,
     pub paths: Vec<Path>,
@@ -192,10 +191,10 @@ pub(crate) struct Wave {
 }
 
 impl Wave {
-    /// Whether the `i`th ray has hit something where it has crossed a surface just before, or as near as places err: one that it
-    /// started before, or that it goes on behind.
+    /// Whether the `i`th hit coincides, within rounding error, with the surface that the ray crossed just before: the one at its
+    /// start, or the one behind which it goes on.
     pub(crate) fn touches(&self, i: usize) -> bool {
-        /// More than places err, in parts of what they are computed from, where a ray does not graze the surface.
+        /// Bound on the relative error of positions where a ray does not graze the surface.
         const NEAR: f32 = 1.0 / (1 << 16) as f32;
         let (ray, hit) = (&self.rays[i], &self.hits[i]);
         let before = if self.starts { &self.after[i] } else { &self.paths[i].crossed };
@@ -208,10 +207,10 @@ impl Wave {
         hit.t - before.t <= NEAR * (hit.t + ray.origin.abs().max_element())
     }
 
-    /// What the `i`th ray has crossed last if what it has hit is a hole.
+    /// Last surface that the `i`th ray has crossed, if its hit is a hole.
     pub(crate) fn crossed(&self, i: usize) -> Hit {
         match self.starts {
-            // What it has met at its start it meets in the same place.
+            // A surface met at the start counts as met in the same place.
             true if self.touches(i) => Hit { t: self.hits[i].t, ..self.after[i] },
             true => Hit::MISS,
             false => self.paths[i].crossed,
@@ -255,7 +254,7 @@ mod tests {
         let (mut queues, mut waves) = ([(); 2].map(|()| Queue::default()), [(); 2].map(|()| Wave::default()));
         let mut sent = [0_u32; 90];
         for round in 0..40 {
-            // Which samples send rays, each a few: once in their order, once in another.
+            // Samples that send a few rays each: once in order, once in another order.
             let samples: Vec<u32> = (0..90).filter(|_| random.below(3) == 0).collect();
             let mut other = samples.clone();
             other.sort_by_key(|sample| sample.wrapping_mul(2_654_435_761).rotate_left(round));
@@ -276,7 +275,7 @@ mod tests {
             }
             let numbers = |wave: &Wave| {
                 let mut rays: Vec<_> = wave.rays.iter().map(|ray| (ray.sample, ray.t_min as u32)).collect();
-                // Few rays are taken as they came: among samples in any order, of one sample in that of its rays.
+                // Few rays are taken unsorted: samples in any order, but the rays of one sample in theirs.
                 rays.sort_by_key(|ray| ray.0);
                 rays
             };

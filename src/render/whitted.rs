@@ -1,11 +1,10 @@
-//! Whitted's ray tracer: a tree of reflected, refracted and shadow rays behind every point of the picture, grown wave
-//! by wave instead of by recursion.
+//! Whitted's ray tracer: a tree of reflected, refracted and shadow rays behind every point of the picture, grown wave by wave
+//! instead of by recursion.
 //!
-//! T. Whitted, "An Improved Illumination Model for Shaded Display" (1980). A branch ends where its ray leaves the scene
-//! (it sees the background or the environment), where the product of its weights falls below the cutoff, or at the
-//! maximum depth; a branch that is cut adds black, and the test comes before a secondary ray is set up. Depth counts
-//! bounces after the eye ray. Going straight on through a material that is absent, blended or seen from its invisible
-//! back is no bounce.
+//! T. Whitted, "An Improved Illumination Model for Shaded Display" (1980). A branch ends where its ray leaves the scene (it sees
+//! the background or the environment), where its throughput falls below the cutoff, or at the maximum depth; a branch that is cut
+//! adds black, and the test precedes the setup of a secondary ray. Depth counts bounces after the eye ray. Passing straight
+//! through a surface that is absent, blended or seen from its invisible back is not a bounce.
 
 use super::Progress;
 use super::alpha_voids::Cones;
@@ -33,14 +32,14 @@ use crate::math::{DVec3, Vec3};
 use bytemuck::{Pod, Zeroable};
 use std::hint::black_box;
 
-/// Angle across a path's cone, radians, above which rough surfaces have spread it.
+/// Cone spread, radians, above which a path counts as spread by rough surfaces.
 pub(super) const SPREAD: f32 = 0.1;
-/// Rays traced together at most; bounds the memory of a worker.
+/// Most rays traced together; bounds the memory of a worker.
 const WAVE_LIMIT: usize = 1 << 13;
-/// The turn of a ray that goes on behind a surface.
+/// Branch number of a ray that goes on behind a surface.
 const ON: u32 = u32::MAX >> 2;
 
-/// What a sample of the picture has gathered.
+/// Light gathered by a sample of the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Sample {
@@ -54,12 +53,12 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     pub(super) context: &'a Context<'a>,
     caster: RayCaster<'a, A>,
     pub primary_rays: PrimaryRays,
-    /// Rays that start, by class.
+    /// New rays, by class.
     pub(super) starting: [Queue; 3],
     /// Rays that go on behind a hit, by class.
     pub(super) continuing: [Queue; 3],
     wave: Wave,
-    /// What rays are inside of.
+    /// Media that rays are inside of.
     pub(super) media: MediaTable,
     pub(super) buffers: ShadingBuffers,
     pub(super) shadows: ShadowQueue,
@@ -67,22 +66,22 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     pub(super) hotspots: ShadowQueue,
     environment_rays: EnvironmentRays,
     pub samples: Vec<Sample>,
-    /// The place of each sample among those of its pixel; empty where only rays decide random choices.
+    /// Position of each sample among those of its pixel; empty where random choices depend on rays alone.
     pub streams: Vec<Stream>,
-    /// Which branches go on by chance.
+    /// Russian roulette for branches.
     pub roulette: Roulette,
-    /// Whether rays of each sample were spread by chance; empty where none may be.
+    /// Whether random choices spread the rays of each sample; empty where they never do.
     pub by_chance: Vec<bool>,
     /// The first surface of each sample; empty unless layers are wanted.
     pub firsts: Vec<FirstSurface>,
     pub counts: ByClass<P>,
 }
 
-/// A ray and what it has hit.
+/// A ray and its hit.
 pub(super) struct Arrival<'a> {
     pub ray: &'a Ray,
     pub hit: &'a Hit,
-    /// Whether the hit lies where the ray has crossed another surface just before.
+    /// Whether the ray has crossed another surface at the same place just before.
     pub touches: bool,
 }
 
@@ -109,12 +108,12 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// What is subtracted from world positions.
+    /// Centre of the scene, which is subtracted from world positions.
     pub(crate) fn center(&self) -> DVec3 {
         self.context.world.center
     }
 
-    /// Prepares for `samples` samples, whose eye rays are added to [`Self::primary_rays`], and start inside of `media`.
+    /// Prepares for `samples` samples, whose eye rays are then added to [`Self::primary_rays`] and start inside of `media`.
     pub(crate) fn reset(&mut self, samples: usize, layers: bool, media: &[Medium]) {
         self.counts.each_mut().into_iter().for_each(|probe| probe.batch(samples));
         self.starting.iter_mut().chain(&mut self.continuing).for_each(Queue::clear);
@@ -133,19 +132,19 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.firsts.resize(if layers { samples } else { 0 }, FirstSurface::NONE);
     }
 
-    /// Adds an eye ray that goes by itself.
+    /// Adds a eye ray outside of [`Self::primary_rays`].
     pub(crate) fn start(&mut self, ray: Ray, path: Path) {
         self.starting[RayClass::Primary as usize].push(ray, path, Hit::MISS);
     }
 
-    /// Traces all trees to their leaves; false when the user gave up before the end.
+    /// Traces all ray trees to their leaves; returns false if the user cancelled.
     pub(crate) fn trace(&mut self) -> bool {
         self.trace_primary_rays();
         self.trace_waves();
         !self.caster.cancelled
     }
 
-    /// Traces what follows eye rays, once so much waits that memory would fill.
+    /// Traces the secondary rays of primary rays once so many are queued that memory would fill.
     pub(super) fn trace_followers(&mut self) {
         if self.starting.iter().chain(&self.continuing).map(Queue::len).sum::<usize>() >= FOLLOWERS {
             self.trace_shadows();
@@ -153,7 +152,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// Traces all rays that wait, and what follows them.
+    /// Traces all queued rays, and the rays that follow from them.
     fn trace_waves(&mut self) {
         while let Some(class) = self.next_wave() {
             if self.caster.cancelled {
@@ -166,7 +165,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// Traces all primary rays and shades what they hit.
+    /// Traces all primary rays and shades their hits.
     fn trace_primary_rays(&mut self) {
         let mut primary_rays = std::mem::take(&mut self.primary_rays);
         {
@@ -184,7 +183,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.primary_rays = primary_rays;
     }
 
-    /// Takes the next wave and finds its hits. Rays that go on come before rays that start a deeper generation.
+    /// Takes the next wave and finds its hits. Continuing rays come before new rays, which are a deeper generation.
     fn next_wave(&mut self) -> Option<RayClass> {
         let class = self.take_wave()?;
         let wave = &mut self.wave;
@@ -227,8 +226,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.environment_rays.trace((self.context, &mut self.media), &mut self.caster, &mut self.counts.shadow, arrive);
     }
 
-    /// Traces shadow rays once many wait. In between a sample sees one point at most, so that in whatever order these are
-    /// shaded, what comes of the rays is added to the same.
+    /// Traces shadow rays once many are queued. Between two calls each sample is shaded at one point at most, so that the order
+    /// in which points are shaded does not change the order of sums.
     pub(super) fn relieve(&mut self) {
         if self.shadows.len() >= SHADOW_LIMIT
             || self.hotspots.len() >= SHADOW_LIMIT
@@ -238,7 +237,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// A ray that met nothing: the background shows where the line of sight is straight, else the environment is seen.
+    /// Ends a ray that hit nothing: along the line of sight the background shows through, otherwise the environment is seen.
     pub(super) fn leave(&mut self, ray: &Ray, path: &Path) {
         let sample = &mut self.samples[ray.sample as usize];
         if path.straight && !self.context.shows_environment {
@@ -254,7 +253,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         sample.radiance += path.weight * seen;
     }
 
-    /// Adds what the surface at a hit shows by itself, and queues the rays that find the rest.
+    /// Adds the light that the surface at a hit emits, and queues the rays that gather the rest.
     pub(super) fn shade(&mut self, class: RayClass, Arrival { ray, hit, touches }: Arrival, path: &Path) {
         let context = self.context;
         let attenuated =
@@ -262,14 +261,14 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let (arriving, path) = (path, attenuated.as_ref().unwrap_or(path));
         let target = HitPrim::new(context.scene, context.world, hit.prim);
         let material = target.material;
-        // Rays to the hotspot end at what would turn them.
+        // Rays to the hotspot end at materials that would turn them.
         let seeing = path.skips_hotspot && context.turns(material);
         let seeing = seeing.then(|| [arriving, path].map(|path| Path { skips_hotspot: false, ..*path }));
         let (arriving, path) = seeing.as_ref().map_or((arriving, path), |[arriving, path]| (arriving, path));
         let width = path.cone_width + path.cone_spread * hit.t;
         let mut surface = Surface::new(context.world, target, ray, hit, width);
 
-        // Pass what is not there: backs of one-sided faces, absent texels, and part of what is blended.
+        // Pass through invisible surfaces: backs of one-sided faces, absent texels, and part of blended ones.
         if !surface.front && !material.double_sided && !material.reflection.transmits() {
             return self.continuing[class as usize].push_behind(*ray, path.behind_back(), *hit);
         }
@@ -283,7 +282,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             self.go_on(ray, path, hit, coverage);
         }
 
-        // Local colour: emitted, from everywhere, from each light.
+        // Local colour: emission, ambient light, and each light.
         surface.shade_smoothly(context.textures);
         self.note(ray, path, &surface, base.truncate());
         let bsdf = bsdf_seen(context, &surface, base.truncate(), path);
@@ -312,7 +311,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// Adds what a point shows by itself and of its surroundings, or sends the rays that find what hides those.
+    /// Adds the emission of a point and the light of its surroundings, or queues the rays that find their occlusion.
     pub(super) fn shade_environment<G: ShadingPoint>(&mut self, point: &PathVertex<G>) {
         let (context, surface, bsdf) = (self.context, point.surface, point.bsdf);
         let (weight, sample) = (point.path.weight, point.ray.sample);
@@ -320,7 +319,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if context.env_rays == 0 || bsdf.is_unlit() {
             return self.add(sample, weight * (bsdf.emission + open + through));
         }
-        // What is looked up through glass is seen on its other side, where these rays do not go.
+        // Surroundings seen through glass lie on its other side, where these rays do not go.
         self.add(sample, weight * (bsdf.emission + through));
         if open.is_finite() && open != Vec3::ZERO {
             let media = context.absorption.is_some().then_some(point.path.media);
@@ -329,7 +328,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// Goes on behind a surface that covers a part.
+    /// Queues the ray behind a surface that covers only a part of it.
     pub(super) fn go_on(&mut self, ray: &Ray, path: &Path, hit: &Hit, coverage: f32) {
         let weight = path.weight * (1.0 - coverage);
         if self.context.is_alive(weight, path.part) {
@@ -340,18 +339,18 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// Numbers for the random choices of a point.
+    /// Random numbers of a point.
     pub(super) fn draws<G>(&self, point: &PathVertex<G>, purpose: Purpose) -> Draws {
         Draws::at(self.context.seed, &self.streams, point.path.branch, point.ray, point.hit, purpose)
     }
 
-    /// Whether shadow rays of little light are sent by chance: where they may have a long way, through what lets light pass.
-    /// Elsewhere they are so soon answered that certainty about a pixel costs less with all of them.
+    /// Whether shadow rays with little light are sent by chance: where they may have to pass many surfaces that transmit light.
+    /// Elsewhere they are so fast that a pixel becomes certain at less cost with all of them.
     pub(super) fn chooses_shadow_rays(&self) -> bool {
         !self.context.world.is_opaque() && self.roulette.is_at_work()
     }
 
-    /// Remembers the first surface of a sample for the layers.
+    /// Records the first surface of a sample for the layers.
     fn note(&mut self, ray: &Ray, path: &Path, surface: &Surface, albedo: Vec3) {
         let Some(first) = self.firsts.get_mut(ray.sample as usize) else { return };
         if path.straight && !first.is_some() {
@@ -367,7 +366,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// Direct light, of area lights from several of their points.
+    /// Adds direct light, from several points of each area light.
     fn light(&mut self, point: &PathVertex<Surface>, crossing: &Crossing) {
         let (context, position) = (self.context, point.surface.position);
         let mut draws = None;
@@ -388,7 +387,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// Light of one point of a light that is so much of it: without shadows at once, with them when its ray has come through.
+    /// Adds the light of one point of a light, which stands for a fraction `part` of it: at once if the light casts no shadows,
+    /// otherwise through a shadow ray.
     fn shade_light(
         &mut self,
         point: &PathVertex<Surface>,
@@ -426,7 +426,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 }
 
-/// What a surface of this base colour is made of, as a ray of a path sees it.
+/// BSDF of a surface with this base colour, as a ray of the path sees it.
 fn bsdf_seen(context: &Context, surface: &Surface, base: Vec3, path: &Path) -> Bsdf {
     let material = surface.target.material;
     let mut bsdf = Bsdf::new(surface, base, context.textures);
