@@ -1,4 +1,4 @@
-//! Cameras as files describe them.
+//! Cameras as described in files.
 
 use crate::math::{DAffine3, DMat3, DVec3};
 
@@ -13,28 +13,28 @@ pub struct Camera {
     pub world_from_camera: DAffine3,
 }
 
-/// How the camera maps directions to the picture.
+/// Mapping of directions to the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
     /// A pinhole.
     Perspective {
         /// Vertical field of view, radians.
         y_fov: f64,
-        /// Width / height the file asks for; `None`: the picture's.
+        /// Aspect ratio, width / height, given by the file; `None`: the picture's.
         aspect: Option<f64>,
     },
     /// Parallel rays.
     Orthographic {
-        /// Half the width seen, world units.
+        /// Half the visible width, world units.
         x_mag: f64,
-        /// Half the height seen, world units.
+        /// Half the visible height, world units.
         y_mag: f64,
     },
 }
 
 impl Camera {
-    /// The camera as a part of something that is placed in the world: it looks where that makes it look, and sees as much
-    /// of it as before.
+    /// Returns the camera as a part of something placed in the world: it is moved along, and sees the same extent of it as
+    /// before.
     #[must_use]
     pub fn placed(mut self, world_from_part: &DAffine3) -> Self {
         let placed = *world_from_part * self.world_from_camera;
@@ -48,8 +48,8 @@ impl Camera {
         self
     }
 
-    /// A transform without scale, shear and mirror: the axes looked along and upwards are kept. `None` where there are
-    /// none.
+    /// Removes scale, shear and mirroring from a transform, keeping the view axis and the direction upwards. `None` if these are
+    /// degenerate.
     pub fn rigid(world: DAffine3) -> Option<DAffine3> {
         let back = world.matrix3.z_axis.try_normalize()?;
         let up = world.matrix3.y_axis;
@@ -58,9 +58,9 @@ impl Camera {
         rigid.is_finite().then_some(rigid)
     }
 
-    /// `world_from_camera` of a camera at `eye` that sees `at` in the middle, with `up` towards the top as well as can be.
+    /// `world_from_camera` of a camera at `eye` with `at` in the centre of its picture, and `up` as close to its top as possible.
     ///
-    /// When `at` is the eye it looks along −z; when `up` lies along the view, another axis stands in for it.
+    /// If `at` is the eye, the view is along −z; if `up` is parallel to the view, another axis stands in for it.
     pub fn look_at(eye: DVec3, at: DVec3, up: DVec3) -> DAffine3 {
         let z = (eye - at).try_normalize().unwrap_or(DVec3::Z);
         let up = up.normalize_or(DVec3::Y);
@@ -92,7 +92,7 @@ mod tests {
         let scaled = camera.clone().placed(&DAffine3::from_scale(DVec3::splat(3.0)));
         assert_eq!(scaled.projection, Projection::Orthographic { x_mag: 6.0, y_mag: 3.0 });
         assert_eq!(scaled.world_from_camera, DAffine3::from_translation(DVec3::new(0.0, 0.0, 3.0)));
-        // Turned and moved alone it stays as it is, to the last bit.
+        // If only rotated and translated, it stays the same to the last bit.
         let turned = DAffine3::from_rotation_translation(DQuat::from_rotation_y(0.3), DVec3::X);
         let placed = camera.clone().placed(&turned);
         assert_eq!((placed.projection, placed.world_from_camera), (projection, turned * camera.world_from_camera));

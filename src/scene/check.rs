@@ -1,28 +1,28 @@
-//! Whether a scene that was made by hand can be placed and rendered.
+//! Validation of scenes made by hand, before they are placed and rendered.
 
 use super::corners::{ObjectBox, placed_box};
 use super::{Instance, Mesh, Pixels, Scene};
 use crate::math::aabb::Aabb;
 use crate::math::{DVec3, Vec3};
 
-/// What is wrong with a scene, and where.
+/// A fault of a scene, and its place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: {text}")]
 pub struct SceneFault {
-    /// The part, as it is reached from the scene, such as `meshes[2].triangles[7]`.
+    /// Path of the faulty part from the scene, such as `meshes[2].triangles[7]`.
     pub place: String,
-    /// What is wrong with it, with the numbers.
+    /// Description of the fault, with the numbers.
     pub text: String,
 }
 
 impl Scene {
-    /// Whether every index points at what is there, arrays that belong together are equally long, and every shape is finite and
-    /// within [`Self::LARGEST`]. Scenes from [`load`] are sound; who builds one by hand asks before it is placed, since
+    /// Checks that every index is in range, arrays that belong together are equally long, and every shape is finite and within
+    /// [`Self::LARGEST`]. Scenes from [`load`] are sound; one built by hand should be checked before it is placed, because
     /// [`World`], structures and renderer rely on it.
     ///
     /// # Errors
     ///
-    /// The first fault.
+    /// Returns the first fault.
     ///
     /// [`load`]: mod@crate::load
     /// [`World`]: crate::render::World
@@ -73,7 +73,7 @@ impl Scene {
             points(|| format!("textures[{i}].bitmap"), texture.bitmap, self.bitmaps.len(), "bitmaps")?;
         }
         for (i, bitmap) in self.bitmaps.iter().enumerate() {
-            // A pixel that is cut off counts.
+            // A partial pixel at the end counts.
             let found = match &bitmap.pixels {
                 Pixels::Rgb8(bytes) => bytes.len().div_ceil(3),
                 _ => bitmap.texels(),
@@ -88,14 +88,14 @@ impl Scene {
         holds(self.prims() <= Self::MOST_PRIMS, || "instances".into(), text)
     }
 
-    /// The largest size of a coordinate or radius, world units: sums and products of a few of them stay within the range of
+    /// Greatest magnitude of a coordinate or radius, world units: sums and products of a few of them stay within the range of
     /// `f32`. Loaders leave out what is larger.
     pub const LARGEST: f64 = 1e18;
 
-    /// The most prims that can be told apart: the last number of 32 bits means none.
+    /// Greatest number of prims: the last number of 32 bits marks "none".
     pub const MOST_PRIMS: u64 = u32::MAX as u64 - 1;
 
-    /// Prims that are shown: triangles and polygons, those of a mesh once for each instance of it, spheres, cones and planes.
+    /// Number of prims shown: triangles and polygons of every instance, spheres, cones and planes.
     pub fn prims(&self) -> u64 {
         let faces = |mesh: &Mesh| (mesh.triangles.len() + mesh.polygons.len()) as u64;
         let shown = |instance: &Instance| self.meshes.get(instance.mesh as usize).map_or(0, faces);
@@ -105,7 +105,7 @@ impl Scene {
 }
 
 impl Mesh {
-    /// The box of all its positions, used or not; of the origin where there are none.
+    /// Bounding box of all positions, used or not; the origin if there are none.
     pub(crate) fn around(&self) -> ObjectBox {
         let Aabb { lo, hi } = Aabb::around(self.positions.iter().copied());
         if self.positions.is_empty() { (Vec3::ZERO, Vec3::ZERO) } else { (lo, hi) }
@@ -156,23 +156,23 @@ impl Mesh {
     }
 }
 
-/// An index points at one of `len` parts of a kind.
+/// Checks that an index points at one of `len` parts of a kind.
 fn points(place: impl Fn() -> String, index: u32, len: usize, kind: &str) -> Result<(), SceneFault> {
     holds((index as usize) < len, place, || format!("{index} where there are {len} {kind}"))
 }
 
-/// So many texels are all of a picture.
+/// Checks that the number of texels is that of a whole picture.
 fn covers(place: impl Fn() -> String, found: usize, (width, height): (u32, u32)) -> Result<(), SceneFault> {
     let expected = width as usize * height as usize;
     holds(found == expected, place, || format!("{found} texels where {width} × {height} are {expected}"))
 }
 
-/// A coordinate or size is finite and not too large.
+/// Checks that a coordinate or size is finite and not too large.
 fn is_near(place: impl Fn() -> String, size: f64) -> Result<(), SceneFault> {
     holds(size.abs() <= Scene::LARGEST, place, || format!("{size:e} is over {:e}", Scene::LARGEST))
 }
 
-/// So are those of a point.
+/// Checks the coordinates of a point likewise.
 fn is_within(place: impl Fn() -> String, point: DVec3) -> Result<(), SceneFault> {
     holds(point.is_finite(), &place, || format!("{point} is not finite"))?;
     is_near(place, point.abs().max_element())
@@ -194,7 +194,7 @@ mod tests {
 
     type Spoil = fn(&mut Scene);
 
-    /// One of everything.
+    /// A sound scene with one part of most kinds.
     fn sound() -> Scene {
         let mesh = Mesh {
             positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
@@ -232,7 +232,7 @@ mod tests {
         let mut scene = sound();
         scene.meshes[0].triangles = vec![[0, 1, 2]; (1 << 16) - 1];
         let instance = scene.instances[0].clone();
-        // Each shows the triangles and a polygon; sphere, cone and plane are left for the last numbers but two.
+        // Each instance shows the triangles and a polygon; the sphere, the cone and the plane come on top.
         scene.instances = vec![instance; (1 << 16) - 1];
         assert_eq!(scene.prims(), (1 << 32) - (1 << 16) + 3);
         assert_eq!(scene.check(), Ok(()));

@@ -1,8 +1,8 @@
-//! Colours as people write them, made linear.
+//! Colours as people write them, converted to linear values.
 
 use crate::math::Vec3;
 
-/// Names that can be written for colours; values are sRGB bytes.
+/// Colour names and their sRGB bytes.
 pub const NAMES: [(&str, [u8; 3]); 18] = [
     ("black", [0, 0, 0]),
     ("white", [255, 255, 255]),
@@ -24,7 +24,7 @@ pub const NAMES: [(&str, [u8; 3]); 18] = [
     ("navy", [0, 0, 128]),
 ];
 
-/// A colour from `#rgb`, `#rrggbb`, a name (all sRGB) or `r,g,b` (linear, 0 … 1); the result is linear.
+/// Parses a colour: `#rgb`, `#rrggbb`, a name (all sRGB) or `r,g,b` (linear, 0 … 1); the result is linear.
 pub fn parse(text: &str) -> Result<Vec3, String> {
     let text = text.trim();
     if let Some(hex) = text.strip_prefix('#') {
@@ -71,7 +71,7 @@ pub fn from_srgb(codes: [f32; 3]) -> Vec3 {
     Vec3::from(codes.map(decode))
 }
 
-/// The sRGB code, 0 … 1, that [`from_srgb`] reads as this linear value.
+/// The sRGB code, 0 … 1, of a linear value: the inverse of [`from_srgb`].
 pub fn to_srgb(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * libm::powf(linear, 1.0 / 2.4) - 0.055 }
 }

@@ -1,31 +1,31 @@
-//! How far the corners of all faces reach, found without placing every corner of every instance.
+//! Extents of the corners of all faces, found without placing every corner of every instance.
 
 use super::{Instance, Mesh, Scene};
 use crate::math::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// What points reach, in whatever directions somebody asks for.
+/// Extents of points, in whatever directions the implementation tracks.
 ///
-/// It is convex: what holds all corners of a box holds each point in it.
+/// The extents are convex: if they hold all corners of a box, they hold every point in it.
 pub(crate) trait Outline: Clone + Send + Sync {
-    /// Takes in a corner; world space. One that is nowhere has coordinates that are not finite.
+    /// Takes in a corner; world space. The coordinates of a missing or invalid corner are not finite.
     fn add(&mut self, p: DVec3);
 
-    /// Takes in what another has taken in.
+    /// Takes in everything that another outline has taken in.
     fn join(&mut self, other: &Self);
 
-    /// Whether a point adds nothing; `false` where it is nowhere.
+    /// Whether a point would add nothing; `false` if it is not finite.
     fn holds(&self, p: DVec3) -> bool;
 }
 
-/// The box of points.
+/// Bounding box of points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hull {
     /// Least corner; greater than `hi` when there are no points.
     pub lo: DVec3,
     /// Greatest corner.
     pub hi: DVec3,
-    /// Whether all points were finite; the box is that of those which are.
+    /// Whether all points were finite; the box is that of the finite ones.
     pub finite: bool,
 }
 
@@ -48,15 +48,15 @@ impl Outline for Hull {
         self.finite &= other.finite;
     }
 
-    /// Exact: each coordinate of a placed point goes up or down with each of the point's own, rounded or not, so that the
-    /// corners of a mesh's box are the furthest.
+    /// Exact: each coordinate of a placed point is monotonic in each of the point's own coordinates, rounded or not, so that the
+    /// corners of a mesh's box reach furthest.
     fn holds(&self, p: DVec3) -> bool {
         p.cmpge(self.lo).all() && p.cmple(self.hi).all()
     }
 }
 
-/// Takes in the corners of all faces: each that a face uses once for every instance, but for instances whose box is held
-/// by what the others reach.
+/// Takes in the corners of all faces, each used vertex once per instance, but skips instances whose box is held by the extents of
+/// the others.
 pub(crate) fn take_in(scene: &Scene, outline: &mut impl Outline) {
     let instances = || scene.instances.iter().filter(|instance| (instance.mesh as usize) < scene.meshes.len());
     let mut standing = vec![0_u32; scene.meshes.len()];
@@ -65,7 +65,7 @@ pub(crate) fn take_in(scene: &Scene, outline: &mut impl Outline) {
     let corners: Vec<Option<Corners>> = scene.meshes.par_iter().zip(&standing).map(of).collect();
     let placed = || instances().filter_map(|instance| Some((instance, corners[instance.mesh as usize].as_ref()?)));
 
-    // A few corners of every instance of a crowd hold most of the others.
+    // A few corners of every instance of a crowd make extents that hold most of the others.
     let outermost = |(of, &times): (&Option<Corners>, &u32)| match of {
         Some(corners) if times > 1 => corners.outermost(),
         _ => Vec::new(),
@@ -82,29 +82,29 @@ pub(crate) fn take_in(scene: &Scene, outline: &mut impl Outline) {
     }
 }
 
-/// The box of all corners of a mesh's faces, object space; `lo > hi` where there are none.
+/// Bounding box of all corners of a mesh's faces, object space; `lo > hi` if there are none.
 pub(crate) type ObjectBox = (Vec3, Vec3);
 
-/// The box of each mesh; `None` where a corner of a face is nowhere.
+/// Returns the box of each mesh; `None` where a corner of a face is missing or not finite.
 pub(crate) fn object_boxes(scene: &Scene) -> Vec<Option<ObjectBox>> {
     scene.meshes.par_iter().map(|mesh| Corners::of(mesh).bounds).collect()
 }
 
-/// The corners of a box of a mesh where an instance of it stands, world space.
+/// Corners of a mesh's box as placed by an instance, world space.
 pub(crate) fn placed_box((lo, hi): ObjectBox, instance: &Instance) -> [DVec3; 8] {
     let end = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
     std::array::from_fn(|i| place(instance, Vec3::new(end(i, 0), end(i, 1), end(i, 2))))
 }
 
-/// Corners that are worth a thread's while.
+/// Vertices per parallel task.
 const RUN: usize = 1 << 14;
 
-/// What faces of a mesh use of its vertices.
+/// The vertices of a mesh that its faces use.
 struct Corners<'a> {
     mesh: &'a Mesh,
-    /// For each vertex whether a face has it.
+    /// Whether each vertex is used by a face.
     used: Vec<bool>,
-    /// Box of those that are used; `None` where one is nowhere.
+    /// Box of the used vertices; `None` where one is missing or not finite.
     bounds: Option<ObjectBox>,
 }
 
@@ -130,19 +130,19 @@ impl<'a> Corners<'a> {
         corners
     }
 
-    /// Every vertex that a face uses.
+    /// All vertices that a face uses.
     fn all(&self) -> impl Iterator<Item = &Vec3> {
         self.mesh.positions.iter().zip(&self.used).filter(|(_, used)| **used).map(|(p, _)| p)
     }
 
-    /// For each side of the box a corner that reaches it.
+    /// A vertex on each side of the box.
     fn outermost(&self) -> Vec<Vec3> {
         let Some((lo, hi)) = self.bounds else { return Vec::new() };
         let on = |side: Vec3, axis: usize| self.all().find(|p| p[axis] == side[axis]).copied();
         (0..3).flat_map(|axis| [on(lo, axis), on(hi, axis)]).flatten().collect()
     }
 
-    /// Whether it is certain that none of them adds anything.
+    /// Whether it is certain that no corner adds anything to the outline.
     fn are_held(&self, instance: &Instance, outline: &impl Outline) -> bool {
         self.bounds.is_some_and(|bounds| placed_box(bounds, instance).iter().all(|p| outline.holds(*p)))
     }
@@ -185,7 +185,7 @@ mod tests {
         Mesh { positions, triangles, ..Mesh::default() }
     }
 
-    /// Meshes standing in many places, turned, sheared, mirrored and of all sizes.
+    /// Meshes in many places, rotated, sheared, mirrored and of all sizes.
     fn crowd(instances: u32) -> Scene {
         let placed = |i: u32| {
             let t = f64::from(i);
@@ -199,7 +199,7 @@ mod tests {
         Scene { meshes, instances: (0..instances).map(placed).collect(), ..Scene::default() }
     }
 
-    /// The box of every corner, and how many were taken in.
+    /// Box of every corner, and the number of corners taken in.
     #[derive(Clone)]
     struct Counted<'a>(Hull, &'a AtomicU64);
 

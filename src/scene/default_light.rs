@@ -1,41 +1,41 @@
-//! Light for scenes that bring none, so that a bare mesh looks right.
+//! Default lights for scenes without any, so that a bare mesh looks right.
 //!
-//! The key and fill lights belong to the camera: whatever side is seen, it is lit from the upper left and softened
-//! from the right, and nothing is lit from behind only. The studio around it all (`render::studio`) stays with the model.
+//! The key and fill lights move with the camera: whatever side is seen, it is lit from the upper left and softened from the
+//! right, and nothing is lit only from behind. The studio around everything (`render::studio`) stays with the model.
 //!
-//! A file with lamps of its own keeps them as they are, without key and fill. Whether the studio surrounds them is the
-//! loader's choice: glTF has no word for surroundings, so it does there and metals are not black; a scene file says.
+//! A file with lights of its own keeps them unchanged, without key and fill. Whether the studio surrounds them is up to the
+//! loader: glTF cannot describe surroundings, so there the studio does, lest metals be black; a scene file can.
 
 use super::features::is_unlit;
 use super::{Camera, Environment, Light, LightKind, Scene};
 use crate::math::{DVec3, Vec3};
 
-/// What [`add_if_missing`] did.
+/// Outcome of [`add_if_missing`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DefaultLight {
     /// Key, fill and studio were added.
     Added,
-    /// The scene has its own light.
+    /// The scene has lights of its own.
     NotMissing,
-    /// The scene file, or whoever has it drawn, wants none.
+    /// The scene file or the caller wants no default lights.
     NotWanted,
-    /// Nothing in the scene answers to light: the studio was added as a backdrop.
+    /// The scene is entirely unlit: only the studio was added, as a backdrop.
     NotNeeded,
 }
 
-/// Illuminance of the key and fill lights on a face turned to them, lux; white paint returns a π-th of it.
+/// Illuminance of the key and fill lights on a face turned to them, lux; white paint reflects 1/π of it.
 const KEY: f32 = 1.4;
 const FILL: f32 = 0.35;
 
-/// Where they stand, in camera space: +x right, +y up, +z towards the viewer.
+/// Directions towards the lights in camera space: +x right, +y up, +z towards the viewer.
 const KEY_FROM: DVec3 = DVec3::new(-0.5, 0.62, 0.75);
 const FILL_FROM: DVec3 = DVec3::new(0.85, 0.15, 0.55);
 
-/// Adds key, fill and studio, as seen from `camera`, to a scene without any light.
+/// Adds key, fill and studio, as seen from `camera`, to a scene without lights of its own.
 ///
-/// Light is a lamp, an ambient term or an environment; a material that glows is not. A scene in which everything is
-/// unlit needs no lamps and gets the studio alone, to be seen before the same backdrop as others. The fill throws no
-/// shadows: it stands for light from all over that side.
+/// A light is a lamp, an ambient term or an environment; an emissive material is not. An entirely unlit scene needs no lamps and
+/// gets only the studio, so that it has the same backdrop as others. The fill casts no shadows: it stands for light from all over
+/// that side.
 pub fn add_if_missing(scene: &mut Scene, camera: &Camera) -> DefaultLight {
     let what = judged(scene);
     if what == DefaultLight::Added {
@@ -47,7 +47,7 @@ pub fn add_if_missing(scene: &mut Scene, camera: &Camera) -> DefaultLight {
     what
 }
 
-/// What [`add_if_missing`] does to a scene.
+/// Decides what [`add_if_missing`] does to a scene, without doing it.
 pub fn judged(scene: &Scene) -> DefaultLight {
     if scene.hints.default_light == Some(false) {
         return DefaultLight::NotWanted;
@@ -59,7 +59,7 @@ pub fn judged(scene: &Scene) -> DefaultLight {
     if is_unlit(scene) { DefaultLight::NotNeeded } else { DefaultLight::Added }
 }
 
-/// A directional light that comes from `from` in camera space.
+/// A directional light that shines from `from` in camera space.
 fn lamp(name: &str, lux: f32, from: DVec3, shadows: bool, camera: &Camera) -> Light {
     let travels = camera.world_from_camera.transform_vector3(-from).normalize_or(DVec3::NEG_Y);
     Light {
@@ -78,7 +78,7 @@ mod tests {
     use crate::scene::{Material, Projection, Reflection, Sphere};
 
     fn behind() -> Camera {
-        // Stands at −z and looks along +z.
+        // Rotated about y, it looks along +z.
         let world_from_camera = DAffine3::from_rotation_y(std::f64::consts::PI);
         Camera {
             name: String::new(),
@@ -117,7 +117,7 @@ mod tests {
     fn unlit_scenes_get_the_studio_alone_and_scenes_that_want_darkness_nothing() {
         let unlit = Material { reflection: Reflection::Unlit, ..Material::default() };
         let ball = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 };
-        // The second material is there, but on nothing.
+        // The second material exists, but nothing uses it.
         let mut scene = Scene { materials: vec![unlit, Material::plain()], spheres: vec![ball], ..Scene::default() };
         assert_eq!(add_if_missing(&mut scene, &behind()), DefaultLight::NotNeeded);
         assert!(scene.lights.is_empty() && scene.environment == Environment::Studio);

@@ -1,14 +1,14 @@
-//! What a scene needs, so that nothing else is paid for.
+//! Features that a scene needs, so that the renderer does no work for others.
 //!
-//! Only what can be seen counts: materials that no face, sphere, cone or plane names bring no features. The renderer leaves out
-//! the work of absent features; `inspect` lists both halves.
+//! Only visible things count: materials that no face, sphere, cone or plane uses add no features. The renderer skips the work of
+//! absent features; `inspect` lists both present and absent ones.
 
 use super::{AlphaMode, Environment, LightKind, Material, Mesh, Phong, Reflection, Scene};
 use crate::math::Vec3;
 use std::collections::BTreeSet;
 use std::fmt;
 
-/// One thing a scene may need.
+/// A feature that a scene may need.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Feature {
     /// Triangles.
@@ -43,27 +43,27 @@ pub enum Feature {
     MetalRough,
     /// The Phong model.
     Phong,
-    /// Surfaces without light.
+    /// Unlit surfaces.
     Unlit,
-    /// Glowing surfaces.
+    /// Emissive surfaces.
     Emission,
     /// Reflected rays: smooth metals, smooth dielectrics, Phong mirrors.
     Mirrors,
     /// Transmitted rays that go straight on.
     ThinTransmission,
-    /// Transmitted rays that bend.
+    /// Transmitted rays that are refracted.
     Refraction,
     /// Volumes that absorb light.
     Absorption,
     /// Clear coat over a surface.
     Coat,
-    /// Surfaces that are rougher along a grain than across it.
+    /// Anisotropic surfaces, rougher along a grain than across it.
     Anisotropy,
     /// Thin films, whose colours change with the angle.
     Iridescence,
     /// Sheen of cloth.
     Sheen,
-    /// Light that is scattered through surfaces.
+    /// Surfaces that transmit light diffusely.
     DiffuseTransmission,
     /// An index of refraction that depends on the wavelength.
     Dispersion,
@@ -73,13 +73,13 @@ pub enum Feature {
     DirectionalLights,
     /// Spot lights.
     SpotLights,
-    /// Lights that are rectangles.
+    /// Rectangular lights.
     AreaLights,
-    /// Lights that throw shadows.
+    /// Lights that cast shadows.
     Shadows,
-    /// Lights with an extent, whose shadows have soft edges.
+    /// Lights with an extent, which cast soft shadows.
     SoftShadows,
-    /// A picture of the surroundings.
+    /// An environment map.
     Panorama,
 }
 
@@ -93,7 +93,7 @@ pub struct Features {
 pub const SMOOTH: f32 = 0.2;
 
 impl Feature {
-    /// All features, in the order they are listed.
+    /// All features, in the order of reports.
     pub const ALL: [Self; 35] = [
         Self::Triangles,
         Self::Polygons,
@@ -132,7 +132,7 @@ impl Feature {
         Self::Panorama,
     ];
 
-    /// The words for it in reports.
+    /// Name of the feature in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Triangles => "triangles",
@@ -181,7 +181,7 @@ impl fmt::Display for Feature {
 }
 
 impl Features {
-    /// Looks the scene through: once over its meshes and materials, without touching texels.
+    /// Collects the features of a scene in one pass over its meshes and materials, without reading texels.
     pub fn of(scene: &Scene) -> Self {
         let mut features = Self::default();
         features.add_geometry(scene);
@@ -199,12 +199,12 @@ impl Features {
         self.present.contains(&feature)
     }
 
-    /// What the scene needs, in the order of [`Feature::ALL`].
+    /// Features that the scene needs, in the order of [`Feature::ALL`].
     pub fn present(&self) -> impl Iterator<Item = Feature> {
         Feature::ALL.into_iter().filter(|&feature| self.has(feature))
     }
 
-    /// What it can do without.
+    /// Features that the scene does not need, in the same order.
     pub fn absent(&self) -> impl Iterator<Item = Feature> {
         Feature::ALL.into_iter().filter(|&feature| !self.has(feature))
     }
@@ -256,7 +256,7 @@ impl Features {
                     self.add_if(coat.roughness < SMOOTH || coat.roughness_map.is_some(), Feature::Mirrors);
                     self.add_if(coat.normal_map.is_some(), Feature::NormalMaps);
                 }
-                // A map can only lower the factor, so a rough factor may still hide smooth spots.
+                // A map can only lower the roughness, so a high factor may still hide smooth spots.
                 self.add_if(pbr.roughness < SMOOTH || pbr.metal_rough_map.is_some(), Feature::Mirrors);
                 if pbr.transmits() {
                     self.add_if(true, if pbr.thick { Feature::Refraction } else { Feature::ThinTransmission });
@@ -309,14 +309,14 @@ fn has_faces(mesh: &Mesh) -> bool {
     !mesh.triangles.is_empty() || !mesh.polygons.is_empty()
 }
 
-/// Whether nothing in the scene answers to light: all that can be hit is shown in the colours that it has. Asked of most scenes
-/// it looks at one material.
+/// Whether the scene is entirely unlit: everything that can be hit shows its own colour. For most scenes the first material
+/// decides.
 pub fn is_unlit(scene: &Scene) -> bool {
     let mut materials = used_materials(scene).filter_map(|material| scene.materials.get(material as usize)).peekable();
     materials.peek().is_some() && materials.all(|material| matches!(material.reflection, Reflection::Unlit))
 }
 
-/// Indices of the materials of everything that can be hit, some several times.
+/// Indices of the materials of everything that can be hit, with repetitions.
 fn used_materials(scene: &Scene) -> impl Iterator<Item = u32> {
     let placed = scene.instances.iter().filter_map(|instance| scene.meshes.get(instance.mesh as usize));
     let meshes = placed.filter(|mesh| has_faces(mesh)).map(|mesh| mesh.material);

@@ -1,18 +1,18 @@
-//! Render settings that a scene file brings along; the command line overrides each of them.
+//! Render settings in a scene file; the command line overrides each of them.
 
-/// Most bounces that may be asked for; the wall of a wine glass leads light along hundreds of total reflections.
+/// Greatest number of bounces; the wall of a wine glass guides light along hundreds of total internal reflections.
 pub const MAX_DEPTH: u32 = 1024;
 
-/// Most stops that a picture may be made brighter or darker by: factors that `f32` holds, and enough for lamps a billion
-/// times as strong as the sun.
+/// Greatest exposure, in stops up or down: the factors fit into `f32`, and are enough for lamps a billion times as strong as the
+/// sun.
 pub const MAX_STOPS: f32 = 100.0;
 
-/// What a scene file asks for; `None`: it does not say.
+/// Settings in a scene file; `None` where the file gives none.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderHints {
     /// Columns and rows.
     pub size: Option<(u32, u32)>,
-    /// Rays a pixel.
+    /// Rays per pixel.
     pub samples: Option<u32>,
     /// Bounces after the eye ray.
     pub depth: Option<u32>,
@@ -22,8 +22,8 @@ pub struct RenderHints {
     pub tone_map: Option<String>,
     /// Exposure, stops.
     pub exposure: Option<f32>,
-    /// Whether a scene without lights gets some.
+    /// Whether a scene without lights gets default lights.
     pub default_light: Option<bool>,
-    /// Which of [`super::Scene::cameras`] is used when the command line names none.
+    /// Index of the camera in [`super::Scene::cameras`] to use when the command line names none.
     pub camera: Option<u32>,
 }

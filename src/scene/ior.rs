@@ -1,8 +1,8 @@
 //! Indices of refraction by name.
 //!
-//! Values as J. M. Brisson Lopes tabulates them (*Ray Tracing*, lecture text, IST Lisbon, 2013).
+//! Values as tabulated by J. M. Brisson Lopes (*Ray Tracing*, lecture text, IST Lisbon, 2013).
 
-/// Substance and index of refraction.
+/// Substances and their indices of refraction.
 pub const TABLE: [(&str, f64); 11] = [
     ("air", 1.00029),
     ("water", 1.33),
@@ -17,7 +17,7 @@ pub const TABLE: [(&str, f64); 11] = [
     ("iodine crystal", 3.34),
 ];
 
-/// The index of a substance; `-` and `_` in the name count as spaces.
+/// Index of refraction of a substance, `None` if it is unknown; `-` and `_` in the name count as spaces.
 pub fn by_name(name: &str) -> Option<f64> {
     let name = name.trim().to_lowercase().replace(['-', '_'], " ");
     TABLE.iter().find(|(known, _)| *known == name).map(|(_, ior)| *ior)

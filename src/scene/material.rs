@@ -1,4 +1,4 @@
-//! How a surface answers to light. Factors are linear; maps multiply them.
+//! Materials: how surfaces reflect, transmit and emit light. Factors are linear; maps multiply them.
 
 use super::{Anisotropy, Coat, DiffuseTransmission, Iridescence, Sheen};
 use crate::math::{Vec2, Vec3};
@@ -10,15 +10,15 @@ pub struct Material {
     pub name: String,
     /// Base (glTF) or diffuse (`Kd`) colour, linear.
     pub base_color: Vec3,
-    /// Opacity factor, 0 clear … 1 solid; what it does depends on `alpha_mode`.
+    /// Opacity factor, 0 clear … 1 solid; its effect depends on `alpha_mode`.
     pub opacity: f32,
     /// sRGB map multiplied into `base_color`; its alpha multiplies `opacity`.
     pub base_color_map: Option<TextureRef>,
     /// Extra opacity map (`map_d`), the red channel, linear.
     pub opacity_map: Option<TextureRef>,
-    /// What the opacity means.
+    /// Effect of the opacity.
     pub alpha_mode: AlphaMode,
-    /// Whether the back of a face is drawn; a back face shades with its normal turned round.
+    /// Whether the back of a face is drawn; it is shaded with the normal reversed.
     pub double_sided: bool,
     /// Emitted radiance, linear, strength included.
     pub emission: Vec3,
@@ -54,7 +54,7 @@ pub enum Reflection {
 /// Parameters of the glTF metallic-roughness model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MetalRough {
-    /// 0 dielectric … 1 metal. A glTF that does not say is 1.
+    /// 0 dielectric … 1 metal; the default in glTF is 1.
     pub metallic: f32,
     /// Perceptual roughness, 0 … 1.
     pub roughness: f32,
@@ -74,28 +74,28 @@ pub struct MetalRough {
     pub transmission: f32,
     /// Linear map, red channel × `transmission`.
     pub transmission_map: Option<TextureRef>,
-    /// Whether light bends and travels inside (a closed volume); without KHR_materials_volume glTF glass is thin: rays
-    /// pass straight on.
+    /// Whether the surface bounds a closed volume, in which light is refracted; without KHR_materials_volume glTF glass is thin:
+    /// rays pass straight through.
     pub thick: bool,
-    /// KHR_materials_volume: how strongly the inside of a thick material absorbs light, 1 / unit of length; 0: clear. A
-    /// length d of it lets exp(−`absorption` d) of the light through (A. Beer, 1852).
+    /// KHR_materials_volume: absorption coefficient of the inside of a thick material, 1 / unit of length; 0: clear. A length d
+    /// transmits exp(−`absorption` d) of the light (A. Beer, 1852).
     pub absorption: Vec3,
-    /// KHR_materials_volume: how thick it is where that is not traced: where surroundings seen through rough glass are
-    /// looked up.
+    /// KHR_materials_volume: thickness where the inside is not traced, that is, where the surroundings are looked up through
+    /// rough glass.
     pub thickness: f32,
     /// Linear map, green channel × `thickness`.
     pub thickness_map: Option<TextureRef>,
-    /// How strongly `ior` depends on the wavelength: 20 / Abbe number, as KHR_materials_dispersion; 0: not at all.
+    /// Dispersion of `ior`: 20 / Abbe number, as KHR_materials_dispersion; 0: none.
     pub dispersion: f32,
-    /// Light that is scattered through it.
+    /// Diffuse transmission.
     pub diffuse_transmission: Option<Box<DiffuseTransmission>>,
-    /// A grain, in whose direction it is rougher.
+    /// Anisotropy: a grain along which the surface is rougher.
     pub anisotropy: Option<Box<Anisotropy>>,
-    /// A thin film on it.
+    /// Thin film on the surface.
     pub iridescence: Option<Box<Iridescence>>,
-    /// Fibres that stand off it.
+    /// Sheen of fibres on the surface.
     pub sheen: Option<Box<Sheen>>,
-    /// Clear coat over all that.
+    /// Clear coat over all other layers.
     pub coat: Option<Box<Coat>>,
 }
 
@@ -116,19 +116,19 @@ pub struct Phong {
     pub shininess: f32,
     /// Linear map, red channel × `shininess`.
     pub shininess_map: Option<TextureRef>,
-    /// Weight of the mirror-reflected ray, linear; zero: no mirror.
+    /// Weight of the reflected ray, linear; zero: no mirror.
     pub mirror: Vec3,
-    /// Weight of the refracted ray (`Tf`), linear; zero: none. Without `fresnel` no more of it counts than `mirror` leaves.
+    /// Weight of the refracted ray (`Tf`), linear; zero: none. Without `fresnel`, limited to what `mirror` leaves.
     pub transmission: Vec3,
-    /// `Ni`, index of refraction of the inside; 1 lets rays pass straight.
+    /// `Ni`, index of refraction of the inside; at 1 rays pass straight through.
     pub ior: f32,
-    /// Whether Fresnel balances mirror and transmission (`illum` 5, 7).
+    /// Whether Fresnel reflectance balances mirror and transmission (`illum` 5, 7).
     pub fresnel: bool,
-    /// How strongly `ior` depends on the wavelength: 20 / Abbe number, as KHR_materials_dispersion; 0: not at all.
+    /// Dispersion of `ior`: 20 / Abbe number, as KHR_materials_dispersion; 0: none.
     pub dispersion: f32,
 }
 
-/// What opacity does.
+/// Effect of a material's opacity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum AlphaMode {
     /// Opacity is ignored.
@@ -144,7 +144,7 @@ pub enum AlphaMode {
 }
 
 impl AlphaMode {
-    /// How much of a surface is seen, from 0 (it is not there) to 1, where its opacity is `opacity`.
+    /// Coverage of a surface of this opacity, from 0 (absent) to 1.
     #[inline]
     pub fn covers(self, opacity: f32) -> f32 {
         match self {
@@ -155,30 +155,30 @@ impl AlphaMode {
     }
 }
 
-/// Which texture, through which coordinates.
+/// A reference to a texture, with its coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureRef {
     /// Index into [`super::Scene::textures`].
     pub texture: u32,
-    /// Which set of [`super::Mesh::uvs`].
+    /// Index of the coordinate set in [`super::Mesh::uvs`].
     pub uv_set: u32,
-    /// Moves the coordinates before the lookup.
+    /// Transform applied to the coordinates before the lookup.
     pub transform: UvTransform,
 }
 
 impl TextureRef {
-    /// The coordinates that it is looked up at.
+    /// Coordinates at which the texture is looked up.
     pub fn coordinates(&self) -> TexCoords {
         TexCoords { set: self.uv_set, transform: self.transform }
     }
 }
 
-/// A set of texture coordinates as a transform moves them.
+/// A transformed set of texture coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TexCoords {
-    /// Which set of [`super::Mesh::uvs`].
+    /// Index of the set in [`super::Mesh::uvs`].
     pub set: u32,
-    /// What moves them.
+    /// Transform of the coordinates.
     pub transform: UvTransform,
 }
 
@@ -187,20 +187,20 @@ pub struct TexCoords {
 pub struct UvTransform {
     /// Added last.
     pub offset: Vec2,
-    /// Radians; the matrix of the extension's text.
+    /// Radians; the matrix is that in the extension's text.
     pub rotation: f32,
     /// Applied first.
     pub scale: Vec2,
 }
 
 impl UvTransform {
-    /// What it takes the steps (1, 0) and (0, 1) to.
+    /// Images of the steps (1, 0) and (0, 1).
     pub fn axes(&self) -> [Vec2; 2] {
         let (sin, cos) = if self.rotation == 0.0 { (0.0, 1.0) } else { libm::sincosf(self.rotation) };
         [Vec2::new(cos, -sin) * self.scale.x, Vec2::new(sin, cos) * self.scale.y]
     }
 
-    /// Whether u and v grow the same ways as before.
+    /// Whether u and v keep their directions of growth.
     pub fn keeps_directions(&self) -> bool {
         self.rotation == 0.0 && self.scale.cmpgt(Vec2::ZERO).all()
     }
@@ -213,7 +213,7 @@ impl Default for UvTransform {
 }
 
 impl Default for MetalRough {
-    /// glTF's defaults: all metal, fully rough.
+    /// glTF's defaults: fully metallic, fully rough.
     fn default() -> Self {
         Self {
             metallic: 1.0,
@@ -241,7 +241,7 @@ impl Default for MetalRough {
 }
 
 impl MetalRough {
-    /// Its maps.
+    /// All maps of the model that are present.
     pub fn maps(&self) -> impl Iterator<Item = &TextureRef> {
         let own = [
             &self.metal_rough_map,
@@ -258,7 +258,7 @@ impl MetalRough {
         own.into_iter().chain(through).chain(anisotropy).chain(iridescence).chain(sheen).chain(coat).flatten()
     }
 
-    /// Every slot that can hold a map.
+    /// All slots that can hold a map.
     pub fn maps_mut(&mut self) -> Vec<&mut Option<TextureRef>> {
         let mut slots = vec![
             &mut self.metal_rough_map,
@@ -277,25 +277,25 @@ impl MetalRough {
         slots
     }
 
-    /// The `absorption` that leaves `color` of white light after `distance`; none for distances that are not positive or
-    /// not finite.
+    /// Coefficient of [`Self::absorption`] at which `color` remains of white light after `distance`; zero for distances that are
+    /// not positive and finite.
     pub fn absorption_of(color: Vec3, distance: f32) -> Vec3 {
         if !(distance > 0.0 && distance.is_finite()) {
             return Vec3::ZERO;
         }
-        // No light at all would take an infinite coefficient, which lets nothing through a length of zero either.
+        // Black would take an infinite coefficient, which absorbs everything even over a length of zero.
         let absorbed = |c: f32| (-libm::logf(c.clamp(f32::MIN_POSITIVE, 1.0)) / distance).min(f32::MAX);
         Vec3::new(absorbed(color.x), absorbed(color.y), absorbed(color.z))
     }
 }
 
 impl MetalRough {
-    /// Whether light passes any of it; metal lets nothing through, and a map can only lower how much of it is metal.
+    /// Whether the surface transmits any light; metal transmits none, but a map can only lower the metallic factor.
     pub fn transmits(&self) -> bool {
         self.transmission > 0.0 && (self.metallic < 1.0 || self.metal_rough_map.is_some())
     }
 
-    /// Whether it has anything besides the core model: what depends on the view at each point.
+    /// Whether the material has lobes besides the core model, which depend on the view at each point.
     pub fn has_lobes(&self) -> bool {
         self.anisotropy.is_some() || self.iridescence.is_some() || self.sheen.is_some() || self.coat.is_some()
     }
@@ -320,7 +320,7 @@ impl Default for Phong {
 }
 
 impl Default for Material {
-    /// glTF's default material: white, all metal, fully rough, opaque, one-sided.
+    /// glTF's default material: white, fully metallic, fully rough, opaque, one-sided.
     fn default() -> Self {
         Self {
             name: String::new(),
@@ -344,7 +344,7 @@ impl Default for Material {
 }
 
 impl Material {
-    /// The material of geometry that names none and has no colours of its own: light grey, matt, seen from both sides.
+    /// Material of geometry that has neither a material nor colours: light grey, matt, double-sided.
     pub fn plain() -> Self {
         Self {
             name: "plain".into(),
@@ -355,7 +355,7 @@ impl Material {
         }
     }
 
-    /// The textures that it names.
+    /// Textures that the material uses.
     pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
         let common = [
             &self.base_color_map,
@@ -374,7 +374,7 @@ impl Material {
         common.into_iter().flatten().chain(own).chain(phong.into_iter().flatten().flatten())
     }
 
-    /// Every slot that can hold a texture.
+    /// All slots that can hold a texture.
     pub fn textures_mut(&mut self) -> Vec<&mut Option<TextureRef>> {
         let mut slots = vec![
             &mut self.base_color_map,
@@ -392,7 +392,7 @@ impl Material {
         slots
     }
 
-    /// The metallic-roughness model, if that is what it is.
+    /// The metallic-roughness model, if the material has that.
     pub fn metal_rough(&self) -> Option<&MetalRough> {
         match &self.reflection {
             Reflection::MetalRough(m) => Some(m),
@@ -400,14 +400,14 @@ impl Material {
         }
     }
 
-    /// Whether a hit always stops light and sight: what `accel` calls *opaque*.
+    /// Whether a hit always stops light and sight, that is, `accel` counts the prim as *opaque*.
     pub fn is_opaque(&self) -> bool {
         self.alpha_mode == AlphaMode::Opaque && !self.reflection.transmits()
     }
 }
 
 impl Reflection {
-    /// Whether light passes it as it passes glass: rays can enter it, and its back faces are seen from inside.
+    /// Whether the surface transmits light as glass does: rays can enter it, and its back faces are visible from inside.
     pub fn transmits(&self) -> bool {
         match self {
             Self::MetalRough(m) => m.transmits(),
@@ -416,7 +416,7 @@ impl Reflection {
         }
     }
 
-    /// This material without glass: nothing passes it, and it has no inside.
+    /// This reflection without transmission: it transmits no light and has no inside.
     #[must_use]
     pub fn without_transmission(self) -> Self {
         match self {

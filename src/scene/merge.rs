@@ -1,10 +1,10 @@
-//! Putting one scene into another.
+//! Merging one scene into another.
 
 use super::{Light, LightKind, Scene, UpAxis};
 use crate::math::{DAffine3, DMat3, DVec3};
 use std::mem::take;
 
-/// Where the meshes and materials of a part lie among those of the whole.
+/// Offsets of the meshes and materials of a part among those of the whole scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stored {
     meshes: u32,
@@ -14,16 +14,15 @@ pub struct Stored {
 impl Scene {
     /// Adds all of `part`, placed by `world_from_part`; a part whose up axis differs is turned upright first.
     ///
-    /// Ambient light, environment, background and hints stay this scene's own. Indices of `part` move up; those of
-    /// this scene stay valid. Spheres, and the radii of cones, take the mean of a
-    /// scale.
+    /// Ambient light, environment, background and hints remain those of this scene. Indices of `part` are shifted; those of this
+    /// scene stay valid. Radii of spheres and cones scale by the mean of the scale factors.
     pub fn append(&mut self, mut part: Self, world_from_part: &DAffine3) -> Stored {
         let stored = self.store(&mut part);
         self.place(part, stored, world_from_part);
         stored
     }
 
-    /// What of this scene stands somewhere, as [`Self::place`] takes it: it is small beside what it shows.
+    /// The placed contents of this scene, as taken by [`Self::place`]: little data, compared to the meshes and pictures.
     pub fn places(&self) -> Self {
         Self {
             up: self.up,
@@ -38,7 +37,7 @@ impl Scene {
         }
     }
 
-    /// Takes from `part` what does not depend on where it stands.
+    /// Takes from `part` what does not depend on its placement.
     fn store(&mut self, part: &mut Self) -> Stored {
         let [meshes, materials, textures, bitmaps] =
             [self.meshes.len(), self.materials.len(), self.textures.len(), self.bitmaps.len()].map(count);
@@ -58,8 +57,8 @@ impl Scene {
         Stored { meshes, materials }
     }
 
-    /// Puts the [`Self::places`] of a part, whose meshes and materials this scene has stored, somewhere; as often as is
-    /// wanted.
+    /// Places the [`Self::places`] of a part, whose meshes and materials this scene has stored; may be called any number of
+    /// times.
     pub fn place(&mut self, part: Self, Stored { meshes, materials }: Stored, world_from_part: &DAffine3) {
         let place = *world_from_part * part.up.turned_to(self.up);
         self.instances.extend(part.instances.into_iter().map(|mut i| {
@@ -114,7 +113,7 @@ fn moved(mut light: Light, place: &DAffine3) -> Light {
 }
 
 impl UpAxis {
-    /// The quarter turn around x that makes this axis point where `to` does.
+    /// Quarter turn around x that takes this up axis to `to`.
     pub fn turned_to(self, to: Self) -> DAffine3 {
         let matrix = match (self, to) {
             (Self::Z, Self::Y) => DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y),

@@ -1,4 +1,4 @@
-//! Geometry: indexed triangles (and whole n-gons), spheres, cones, planes, and where they stand.
+//! Geometry: indexed triangles (and whole n-gons), spheres, cones, planes, and their placement.
 
 use super::TexCoords;
 use crate::math::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
@@ -15,11 +15,11 @@ pub struct Mesh {
     pub material: u32,
     /// Vertices, object space.
     pub positions: Vec<Vec3>,
-    /// Unit shading normals; empty: faces are flat.
+    /// Unit shading normals; empty: faces are shaded flat.
     pub normals: Vec<Vec3>,
     /// Unit tangents with handedness in `w`; empty unless a normal map needs them.
     pub tangents: Vec<Vec4>,
-    /// The texture coordinates that they were made along; `None`: the file gave them, for all.
+    /// Texture coordinates that the tangents were generated from; `None`: the file gave the tangents, and they serve all maps.
     pub tangents_along: Option<TexCoords>,
     /// Vertex colours, linear RGBA, multiplied into the base colour; empty: white.
     pub colors: Vec<Vec4>,
@@ -27,23 +27,23 @@ pub struct Mesh {
     pub uvs: Vec<Vec<Vec2>>,
     /// Corners of each triangle, indices into the vertex arrays, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
-    /// The face of the file each triangle was cut from; empty: triangle i is face i.
+    /// Face of the file that each triangle was cut from; empty: triangle i is face i.
     pub face_of_triangle: Vec<u32>,
     /// Planar n-gons kept whole (`--polygons whole`).
     pub polygons: Vec<Polygon>,
     /// Corners of all polygons, indices into the vertex arrays.
     pub polygon_corners: Vec<u32>,
-    /// Whether these are solids that were made of the points and lines of a file.
+    /// Whether the mesh consists of solids made from the points and lines of a file.
     pub is_wire: bool,
 }
 
 impl Mesh {
-    /// The number of corners of all faces.
+    /// Number of corners of all faces.
     pub fn corners(&self) -> usize {
         3 * self.triangles.len() + self.polygon_corners.len()
     }
 
-    /// Bytes of its arrays.
+    /// Size of the arrays, bytes.
     pub fn bytes(&self) -> u64 {
         let vertices = (self.positions.len() + self.normals.len()) * size_of::<Vec3>()
             + (self.tangents.len() + self.colors.len()) * size_of::<Vec4>()
@@ -54,7 +54,7 @@ impl Mesh {
         (vertices + faces) as u64
     }
 
-    /// The number of faces of the file that its triangles and polygons are; those of one face follow each other.
+    /// Number of faces in the file that the triangles and polygons stand for; triangles of one face are adjacent.
     pub fn faces(&self) -> usize {
         let cut = if self.face_of_triangle.is_empty() {
             self.triangles.len()
@@ -81,18 +81,18 @@ pub struct Polygon {
     pub first: u32,
     /// Number of corners, at least 3.
     pub len: u32,
-    /// The face of the file this is.
+    /// Index of the face in the file.
     pub face: u32,
 }
 
 /// A mesh placed in the world.
 ///
-/// A mirrored instance (negative determinant) shows the same front faces as an unmirrored one, as glTF demands. Its
-/// triangles keep the corner order of the mesh in world space as well, so that their winding is turned round there:
-/// whoever asks which side is the front has to turn the answer round for a mirrored instance, as the renderer does.
-/// Normals go by the inverse transpose of the matrix, tangents by the matrix itself, and the sign of a tangent's `w`
-/// turns over with the mirror. Loaders hand over meshes untouched by this; only where the joints of a skin mirror, which
-/// no instance can say, the posed mesh comes with its corners exchanged already.
+/// A mirrored instance (negative determinant) shows the same front faces as an unmirrored one, as glTF demands. Its triangles
+/// keep the mesh's corner order in world space as well, so that their winding is reversed there: whoever decides which side is
+/// the front has to invert the result for a mirrored instance, as the renderer does. Normals are transformed by the inverse
+/// transpose of the matrix, tangents by the matrix itself, and the sign of a tangent's `w` flips with the mirror. Loaders do none
+/// of this to meshes; only where the joints of a skin mirror, which no instance can express, does the posed mesh come with its
+/// corners already exchanged.
 #[derive(Clone, Debug)]
 pub struct Instance {
     /// Name of the node or object.
@@ -103,8 +103,8 @@ pub struct Instance {
     pub world_from_object: DAffine3,
 }
 
-/// Takes normals of faces to where a matrix takes the faces; lengths change as their areas do. For a mirroring one it
-/// points to the same side of the faces still. The inverse transpose up to a factor, which exists for any matrix.
+/// Matrix that transforms normals of faces as `m` transforms the faces; lengths scale as the areas do. Under a mirroring `m` they
+/// still point to the same side of the faces. The inverse transpose up to a factor, which exists for any matrix.
 pub(crate) fn normal_from_object(m: &DMat3) -> DMat3 {
     let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
     if m.determinant() < 0.0 { cofactors * -1.0 } else { cofactors }
@@ -123,7 +123,7 @@ pub struct Sphere {
     pub material: u32,
 }
 
-/// The mantle of a truncated cone in world space, open at both ends; a cylinder where the radii are equal.
+/// The lateral surface of a truncated cone in world space, open at both ends; a cylinder if the radii are equal.
 #[derive(Clone, Debug)]
 pub struct Cone {
     /// Name in the scene file, or an empty string.
@@ -132,7 +132,7 @@ pub struct Cone {
     pub base: DVec3,
     /// Radius there; 0 or more, and not 0 at both ends.
     pub base_radius: f64,
-    /// Centre of the other end, elsewhere than `base`.
+    /// Centre of the other end; differs from `base`.
     pub apex: DVec3,
     /// Radius there.
     pub apex_radius: f64,
@@ -141,7 +141,7 @@ pub struct Cone {
 }
 
 impl Cone {
-    /// Least and greatest corner of its box: a circle of radius r across the unit axis a reaches r √(1 − aₖ²).
+    /// Least and greatest corner of the bounding box: a circle of radius r across the unit axis a reaches r √(1 − aₖ²).
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let axis = (self.apex - self.base).normalize_or_zero();
         let reach = (DVec3::ONE - axis * axis).max(DVec3::ZERO).map(f64::sqrt);

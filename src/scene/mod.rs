@@ -1,4 +1,4 @@
-//! What is to be drawn, as plain data: flat arrays and `u32` indices, no behaviour beyond lookup.
+//! The scene to be drawn, as plain data: flat arrays and `u32` indices, no behaviour beyond lookup.
 //!
 //! A [`Scene`] keeps each object in its own space; positions are `f32` there, while everything that places objects in
 //! the world is `f64`. Units are metres, angles radians, colours linear Rec. 709, unless a field says otherwise.
@@ -36,9 +36,9 @@ use std::mem::size_of;
 /// A whole scene. Indices in its parts point into the arrays here ([`Self::check`]).
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// Geometry, each in its own object space; drawn where an [`Instance`] places it, and nowhere without one.
+    /// Meshes, each in its own object space; drawn only where an [`Instance`] places them.
     pub meshes: Vec<Mesh>,
-    /// Where meshes stand in the world.
+    /// Placements of the meshes in the world.
     pub instances: Vec<Instance>,
     /// Spheres, in world space.
     pub spheres: Vec<Sphere>,
@@ -46,36 +46,36 @@ pub struct Scene {
     pub cones: Vec<Cone>,
     /// Unbounded planes, in world space.
     pub planes: Vec<Plane>,
-    /// Materials; every mesh, sphere, cone and plane names one.
+    /// Materials; every mesh, sphere, cone and plane uses one.
     pub materials: Vec<Material>,
-    /// Textures: a bitmap and how to read it.
+    /// Textures: bitmaps with samplers.
     pub textures: Vec<Texture>,
     /// Decoded pictures.
     pub bitmaps: Vec<Bitmap>,
     /// Lights, in world space.
     pub lights: Vec<Light>,
-    /// Whether lights are given as they are measured, in lux and candela: a picture needs an exposure.
+    /// Whether lights are given in photometric units, lux and candela, so that a picture needs an exposure.
     pub photometric: bool,
-    /// Cameras the file brought, in world space.
+    /// Cameras in the file, in world space.
     pub cameras: Vec<Camera>,
     /// Ambient light: radiance from everywhere, multiplied by a material's ambient colour.
     pub ambient: Vec3,
-    /// What rays that leave the scene see.
+    /// Radiance of rays that leave the scene.
     pub environment: Environment,
-    /// The picture that [`Environment::Panorama`] means.
+    /// Picture of [`Environment::Panorama`].
     pub panorama: Option<Panorama>,
-    /// What primary rays that hit nothing show; `None` when the file does not say.
+    /// Background of primary rays that hit nothing; `None` if the file gives none.
     pub background: Option<Background>,
-    /// Which axis of the file points up.
+    /// Axis of the file that points up.
     pub up: UpAxis,
-    /// Whether the front is where the back of other scenes is: along −Z where +Y points up, as that of avatars in VRM 0.x.
+    /// Whether the model faces backwards: along −Z where +Y points up, as avatars in VRM 0.x do.
     pub faces_back: bool,
-    /// Render settings that a scene file asks for.
+    /// Render settings in the scene file.
     pub hints: RenderHints,
 }
 
 impl Scene {
-    /// Bytes of its lists, of the names in them, of the arrays of its meshes and of its pictures.
+    /// Size of the scene in memory, bytes: lists, names, mesh arrays and pictures.
     pub fn bytes(&self) -> u64 {
         let lists = self.meshes.len() * size_of::<Mesh>()
             + self.instances.len() * size_of::<Instance>()
@@ -102,24 +102,24 @@ impl Scene {
     }
 }
 
-/// What secondary rays that leave the scene see, and diffuse light from afar.
+/// Radiance of secondary rays that leave the scene, and source of diffuse light from afar.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Environment {
-    /// Nothing: black.
+    /// Black.
     #[default]
     Black,
     /// The same radiance from every direction.
     Constant(Vec3),
-    /// The built-in studio, a formula (see `render::studio`).
+    /// The built-in studio, a closed formula (see `render::studio`).
     Studio,
     /// [`Scene::panorama`]; black without one.
     Panorama,
 }
 
-/// What a primary ray that hits nothing shows.
+/// Background of primary rays that hit nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Background {
-    /// Alpha 0.
+    /// Transparent: alpha 0.
     Transparent,
     /// One colour, linear.
     Color(Vec3),
@@ -128,18 +128,18 @@ pub enum Background {
 }
 
 impl Background {
-    /// The one colour that it is, linear.
+    /// The background's single colour, linear, if it has one.
     pub fn color(self) -> Option<Vec3> {
         if let Self::Color(color) = self { Some(color) } else { None }
     }
 }
 
-/// The axis that points up in the file.
+/// The axis that points up in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum UpAxis {
-    /// +Y, as glTF says and most OBJ exporters do.
+    /// +Y, as in glTF and from most OBJ exporters.
     #[default]
     Y,
-    /// +Z, as CAD programs and scanners write.
+    /// +Z, as from CAD programs and scanners.
     Z,
 }

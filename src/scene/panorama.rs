@@ -1,39 +1,39 @@
-//! A picture of everything around the scene.
+//! Panoramas of the scene's surroundings.
 
 use std::any::Any;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
-/// An equirectangular picture of what surrounds the scene, seen from its middle.
+/// An equirectangular picture of the scene's surroundings, seen from its centre.
 ///
-/// In a frame whose +Y is up, the picture's middle is what lies along +X, a quarter to the right of it +Z, and its upper
-/// edge the zenith: the convention of most modelling programs and viewers. Where +Z is up the same frame is turned as the
-/// studio's is.
+/// In a frame whose +Y is up, the picture's centre lies along +X, +Z a quarter of the width to the right of it, and its upper
+/// edge is the zenith: the convention of most modelling programs and viewers. If +Z is up, the frame is rotated in the same way
+/// as the studio's.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Panorama {
-    /// Where it came from, for messages.
+    /// Source of the picture, for messages.
     pub name: String,
-    /// Columns: once around.
+    /// Number of columns: once around.
     pub width: u32,
-    /// Rows: from the zenith down.
+    /// Number of rows: from the zenith down.
     pub height: u32,
     /// Linear radiance (Rec. 709), row by row; finite and not negative.
     pub texels: Arc<Vec<[f32; 3]>>,
-    /// How far it is turned about the up axis, radians: what was along +X comes to lie towards −Z.
+    /// Rotation about the up axis, radians: from +X towards −Z.
     pub rotation: f32,
-    /// What a renderer has made of the texels, for the next picture; clones share it.
+    /// Data that a renderer has derived from the texels, kept for the next picture; clones share it.
     pub prepared: Prepared,
 }
 
-/// Room for one value that is worth keeping beside what it is made of.
+/// A slot for one value derived from the data beside it.
 #[derive(Clone, Default)]
 pub struct Prepared(Arc<OnceLock<Arc<dyn Any + Send + Sync>>>);
 
 impl Prepared {
-    /// What is kept, made by `make` if nothing is yet; `None` where that is of another type.
+    /// Returns the kept value, made by `make` if there is none yet; `None` if it is of another type.
     ///
-    /// Threads that ask at once may each make it, and one of these values is kept: none waits for another, which could be at work
-    /// for the one that waits.
+    /// Threads that call at the same time may each make a value, and one of these is kept: none waits for another, which might
+    /// itself be waiting for that thread's work.
     pub fn get_or_make<T: Send + Sync + 'static>(&self, make: impl FnOnce() -> T) -> Option<Arc<T>> {
         let kept = match self.0.get() {
             Some(kept) => Arc::clone(kept),
@@ -52,7 +52,7 @@ impl fmt::Debug for Prepared {
     }
 }
 
-/// What is made of texels tells nothing that they do not.
+/// All are equal, because the derived value adds no information to the texels.
 impl PartialEq for Prepared {
     fn eq(&self, _: &Self) -> bool {
         true

@@ -1,44 +1,44 @@
-//! Pictures that cover surfaces.
+//! Textures: bitmaps and how they are sampled.
 
 use crate::huge_pages::Paged;
 
-/// A bitmap and how to read between and beyond its texels.
+/// A bitmap and its sampler.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Texture {
     /// Index into [`super::Scene::bitmaps`].
     pub bitmap: u32,
-    /// Wrap and filter.
+    /// Wrapping and filtering.
     pub sampler: Sampler,
 }
 
-/// How texels are found from coordinates.
+/// How texels are looked up by coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Sampler {
-    /// Beyond 0…1 along u.
+    /// Wrapping along u, outside 0…1.
     pub wrap_u: Wrap,
-    /// Beyond 0…1 along v.
+    /// Wrapping along v, outside 0…1.
     pub wrap_v: Wrap,
-    /// When a texel covers more than a pixel.
+    /// Filter where a texel covers more than a pixel.
     pub magnify: Filter,
-    /// When a pixel covers more than a texel.
+    /// Filter where a pixel covers more than a texel.
     pub minify: Filter,
-    /// Whether smaller copies are used when minifying.
+    /// Use of mip levels for minification.
     pub mipmaps: Mipmaps,
 }
 
-/// What coordinates outside 0…1 mean.
+/// How coordinates outside 0…1 wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Wrap {
     /// The picture repeats.
     #[default]
     Repeat,
-    /// Every second copy is mirrored.
+    /// The picture repeats, every second copy mirrored.
     Mirror,
-    /// The border texel goes on.
+    /// The border texel repeats.
     Clamp,
 }
 
-/// What lies between texel centres.
+/// Interpolation between texel centres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Filter {
     /// Bilinear.
@@ -48,12 +48,12 @@ pub enum Filter {
     Nearest,
 }
 
-/// How the smaller copies of a bitmap are read.
+/// How the mip levels of a bitmap are sampled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Mipmaps {
-    /// Not at all.
+    /// Without mip levels.
     None,
-    /// The nearest level.
+    /// From the nearest level.
     Nearest,
     /// Between the two nearest levels (trilinear).
     #[default]
@@ -63,18 +63,18 @@ pub enum Mipmaps {
 /// A decoded picture, rows from the top.
 #[derive(Clone, Debug, Default)]
 pub struct Bitmap {
-    /// Where it came from, for messages.
+    /// Source of the picture, for messages.
     pub name: String,
-    /// Columns.
+    /// Number of columns.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
     /// Texels, row by row; `width × height` of them.
     pub pixels: Pixels,
 }
 
 impl Bitmap {
-    /// How many whole texels are stored.
+    /// Number of whole texels stored.
     pub fn texels(&self) -> usize {
         match &self.pixels {
             Pixels::Rgb8(bytes) => bytes.len() / 3,
@@ -83,12 +83,12 @@ impl Bitmap {
         }
     }
 
-    /// Whether there is one for each place.
+    /// Whether there are exactly `width × height` texels.
     pub fn is_whole(&self) -> bool {
         self.texels() as u64 == u64::from(self.width) * u64::from(self.height)
     }
 
-    /// Bytes of its texels.
+    /// Size of the texels, bytes.
     pub fn bytes(&self) -> u64 {
         let bytes = match &self.pixels {
             Pixels::Rgb8(bytes) => bytes.len(),
@@ -99,10 +99,10 @@ impl Bitmap {
     }
 }
 
-/// Texels as the file stored them; whether 8-bit values are sRGB or linear is decided by the slot that reads them.
+/// Texels as stored in the file; whether 8-bit values are sRGB or linear depends on the slot that uses them.
 #[derive(Clone, Debug)]
 pub enum Pixels {
-    /// 8 bits a channel, RGB, opaque: three bytes each.
+    /// 8 bits a channel, RGB, opaque; three bytes per texel.
     Rgb8(Paged<u8>),
     /// 8 bits a channel, RGBA.
     Rgba8(Paged<[u8; 4]>),

@@ -1,4 +1,4 @@
-//! The box of the model without its strays: parts so few, so small and so far away that nobody meant them to be seen.
+//! Bounding box of the model without strays: parts so few, so small and so far away that nobody meant them to be seen.
 
 use super::crowd::Crowd;
 use super::parts::{Granularity, Part, faces, gather, hull, solids};
@@ -7,39 +7,39 @@ use crate::math::DVec3;
 use crate::scene::corners::{Hull, Outline, object_boxes, placed_box, take_in};
 use crate::scene::{Instance, Mesh, Scene};
 
-/// What there is to see.
+/// Bounds of the visible model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Least corner of the box of the model; world space, finite.
+    /// Least corner of the model's box; world space, finite.
     pub lo: DVec3,
     /// Greatest corner.
     pub hi: DVec3,
     /// Faces, spheres and cones left out as strays.
     pub strays: u64,
-    /// Box of everything, strays too; equal to `lo`, `hi` when there are none.
+    /// Box of everything, strays included; equal to `lo`, `hi` if there are none.
     pub whole: (DVec3, DVec3),
 }
 
 impl Bounds {
-    /// The middle of the box.
+    /// Centre of the box.
     pub fn center(&self) -> DVec3 {
         self.lo * 0.5 + self.hi * 0.5
     }
 
-    /// The box of both.
+    /// The union of both boxes.
     pub fn union(&self, other: &Self) -> Self {
         let whole = (self.whole.0.min(other.whole.0), self.whole.1.max(other.whole.1));
         let strays = self.strays.max(other.strays);
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi), strays, whole }
     }
 
-    /// Half the diagonal, greater than 0.
+    /// Half the diagonal of the box; always greater than 0.
     pub fn radius(&self) -> f64 {
         let radius = (self.hi - self.lo).length() * 0.5;
         if radius > 0.0 && radius.is_finite() { radius } else { 1.0 }
     }
 
-    /// Whether a point of the model lies in the box.
+    /// Whether the box contains a point.
     pub(super) fn contains(&self, p: DVec3) -> bool {
         p.cmpge(self.lo).all() && p.cmple(self.hi).all()
     }
@@ -47,10 +47,9 @@ impl Bounds {
 
 /// Finds the box of the model.
 ///
-/// Space is cut into slices along each axis. Where an empty gap at least half as long as the model parts off an end
-/// with hardly any faces and area, that end is stray; the search goes on in what is left until nothing more comes off.
-/// Whatever is connected to the model, however thin, is part of it. A scene with nothing bounded gets the unit box
-/// around the origin.
+/// Space is cut into slices along each axis. Where an empty gap at least half as long as the model separates an end with hardly
+/// any faces and area, that end is stray; the search goes on in the rest until nothing more comes off. Whatever is connected to
+/// the model, however thin, is part of it. A scene without anything bounded gets the unit box around the origin.
 pub fn robust_bounds(scene: &Scene) -> Bounds {
     let mut corners = Hull::EMPTY;
     take_in(scene, &mut corners);
@@ -58,12 +57,12 @@ pub fn robust_bounds(scene: &Scene) -> Bounds {
     found.unwrap_or_else(|| by_parts(scene))
 }
 
-/// Finds the box of the model where that of all corners is known, such as [`World::bounds`](crate::render::World::bounds).
+/// Finds the box of the model if the box of all corners is known, such as [`World::bounds`](crate::render::World::bounds).
 pub fn robust_bounds_within(scene: &Scene, whole: (DVec3, DVec3)) -> Bounds {
     of_faces(scene, whole).unwrap_or_else(|| by_parts(scene))
 }
 
-/// The box of a model of faces all of whose corners are in the box `whole`; `None` for any other.
+/// Box of a model made of faces whose corners all lie in the box `whole`; `None` for any other model.
 fn of_faces(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
     let (lo, hi) = whole;
     if !(scene.spheres.is_empty() && scene.cones.is_empty() && lo.is_finite() && hi.is_finite()) {
@@ -78,7 +77,7 @@ fn of_faces(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
     (slices.parts() == faces(scene)).then(|| without_strays((scene, &crowd), bounds, slices))
 }
 
-/// The box of the model of any scene, part by part.
+/// Box of the model of any scene, found part by part.
 fn by_parts(scene: &Scene) -> Bounds {
     let Some(whole) = hull(scene, Granularity::Faces, |_| true) else {
         let unit = (DVec3::splat(-0.5), DVec3::splat(0.5));
@@ -90,7 +89,7 @@ fn by_parts(scene: &Scene) -> Bounds {
     without_strays((scene, &crowd), bounds, slices)
 }
 
-/// What is left of all parts, which the slices of their box have.
+/// Removes strays until nothing more comes off; `slices` hold all parts in `bounds`.
 fn without_strays((scene, crowd): (&Scene, &Crowd), mut bounds: Bounds, mut slices: Slices) -> Bounds {
     // Each round zooms in by up to SLICES; the range of f64 needs far fewer than this many.
     for _ in 0..128 {
@@ -100,7 +99,7 @@ fn without_strays((scene, crowd): (&Scene, &Crowd), mut bounds: Bounds, mut slic
         let Some(core) = slices.core() else { break };
         let kept = |part: &Part| bounds.contains(part.center) && slices.lies_in(&core, part.center);
         let Some((lo, hi)) = hull(scene, Granularity::Crowd(crowd, &bounds), kept) else { break };
-        // Boxes of instances of a crowd may be too large.
+        // Boxes of crowd instances may be too large.
         let (lo, hi) = (lo.max(bounds.lo), hi.min(bounds.hi));
         if (lo, hi) == (bounds.lo, bounds.hi) {
             break;
@@ -111,7 +110,7 @@ fn without_strays((scene, crowd): (&Scene, &Crowd), mut bounds: Bounds, mut slic
     if (bounds.lo, bounds.hi) == bounds.whole {
         return bounds;
     }
-    // Boxes of instances of a crowd may reach beyond what is in them.
+    // Boxes of crowd instances may reach beyond their contents.
     let outside = |part: &Part| match part.faces {
         1 => !bounds.contains(part.lo) || !bounds.contains(part.hi),
         _ => !bounds.contains(part.center),
@@ -125,7 +124,7 @@ fn without_strays((scene, crowd): (&Scene, &Crowd), mut bounds: Bounds, mut slic
     bounds
 }
 
-/// The box of what lies in `bounds`, which instances of a crowd have made a little too large.
+/// Tightens `bounds`, which crowd instances have made a little too large, to its contents.
 fn tight(scene: &Scene, bounds: Bounds) -> (DVec3, DVec3) {
     let mut inside = Inside { hull: Hull::EMPTY, bounds };
     take_in(scene, &mut inside);
@@ -137,7 +136,7 @@ fn tight(scene: &Scene, bounds: Bounds) -> (DVec3, DVec3) {
     if lo.cmple(hi).all() { (lo, hi) } else { (bounds.lo, bounds.hi) }
 }
 
-/// The box of all corners inside another.
+/// Bounding box of all corners inside another box.
 #[derive(Clone)]
 struct Inside {
     hull: Hull,
@@ -160,17 +159,17 @@ impl Outline for Inside {
     }
 }
 
-/// Faces of a mesh that are looked at between two questions whether all slices have been reached.
+/// Triangles of a mesh between two tests for whether all slices have been reached.
 const FACES_AT_A_TIME: usize = 1024;
 
-/// Before all of its faces, some from all over a mesh are looked at, once for each so many that it has …
+/// Before all faces of a mesh, a sample from all over it is examined, one sample for this many faces …
 const FACES_A_LOOK: usize = 16 * FACES_AT_A_TIME;
-/// … and so often at most: a face costs three times as much as it does where all of them are.
+/// … and at most this many samples: per face they cost three times as much as examining all faces.
 const LOOKS: usize = 16;
 
-/// Whether it is certain that nothing comes off a model of triangles: because they reach into every slice, which is true of
-/// most models and often found by a look at some of them, or because too many lie before the first gap. `None` where a
-/// corner is nowhere, if it was looked at.
+/// Whether it is certain that nothing comes off a model of triangles: because they reach into every slice, which holds for most
+/// models and is often found from a sample of faces, or because too many lie before the first gap. `None` if a corner that was
+/// examined is missing or not finite.
 fn is_whole(scene: &Scene, bounds: &Bounds) -> Option<bool> {
     let mut sample = Slices::new(bounds);
     let looks = placed(scene).map(|(_, mesh)| looks_at(mesh)).max().unwrap_or(0);
@@ -181,14 +180,14 @@ fn is_whole(scene: &Scene, bounds: &Bounds) -> Option<bool> {
     }
     let mut all = Slices::new(bounds);
     cover_all(scene, &mut all, sample.reached.covered())?;
-    // Polygons are none of the triangles.
+    // Polygons are not among the triangles.
     let counted = scene.meshes.iter().all(|mesh| mesh.polygons.is_empty());
     Some(all.has_no_gap() || counted && all.holds_together())
 }
 
-/// Notes how far the triangles of all instances reach, or of some that leave no gap; `covered` are slices that some are known
-/// to reach into. How many instances were looked at face by face: what stands in a row with one of these is known by its box.
-/// `None` where a corner is nowhere.
+/// Records the slices reached by the triangles of all instances, or of enough of them to leave no gap; `covered` are slices
+/// already known to be reached. Returns the number of instances examined face by face: for others in a row with one of these the
+/// box suffices. `None` where a corner is missing or not finite.
 fn cover_all(scene: &Scene, all: &mut Slices, mut covered: Covered) -> Option<usize> {
     let (mut looked_at, mut cells) = (0, Vec::new());
     let is_crowd = scene.instances.len() > scene.meshes.len();
@@ -212,30 +211,31 @@ fn cover_all(scene: &Scene, all: &mut Slices, mut covered: Covered) -> Option<us
     Some(looked_at)
 }
 
-/// Whether a mesh has more faces than are worth a question.
+/// Whether a mesh has so many faces that shortcuts pay.
 fn has_many(mesh: &Mesh) -> bool {
     mesh.triangles.len() > FACES_AT_A_TIME
 }
 
-/// Every instance with its mesh.
+/// All instances with their meshes.
 fn placed(scene: &Scene) -> impl Iterator<Item = (&Instance, &Mesh)> {
     scene.instances.iter().filter_map(|instance| Some((instance, scene.meshes.get(instance.mesh as usize)?)))
 }
 
-/// How often some faces of a mesh are looked at.
+/// Number of samples of a mesh's faces that are examined first.
 fn looks_at(mesh: &Mesh) -> usize {
     if has_many(mesh) { (mesh.triangles.len() / FACES_A_LOOK + 1).min(LOOKS) } else { 0 }
 }
 
-/// Takes in how far some faces of meshes with many reach, others each time, until no slice is empty; whether that is so.
-/// `None` where a corner is nowhere.
+/// Records the reach of one sample of the faces of large meshes, a different one for each `look`, until no slice is empty;
+/// returns whether that is so. `None` where a corner is missing or not finite.
 fn has_no_gap_at_a_look(scene: &Scene, look: usize, slices: &mut Slices) -> Option<bool> {
     for (instance, mesh) in placed(scene).filter(|(_, mesh)| look < looks_at(mesh)) {
         let corner = |i: u32| {
             let p = mesh.positions.get(i as usize)?;
             Some(instance.world_from_object.transform_point3(p.as_dvec3())).filter(|p| p.is_finite())
         };
-        // Neighbours in the file are neighbours in space: some from all over it reach far sooner than the first ones.
+        // Neighbours in the file are neighbours in space: a sample from all over it reaches every slice far sooner than the first
+        // faces.
         let stride = mesh.triangles.len() / FACES_AT_A_TIME + 1;
         for triangle in mesh.triangles.iter().skip(look).step_by(stride) {
             let [a, b, c] = triangle.map(corner);
@@ -255,7 +255,7 @@ mod tests {
     use crate::math::{DAffine3, Vec3};
     use crate::scene::framing::parts::CHUNK;
 
-    /// Triangles along a spiral, `gap` of it left out at the end, on two instances.
+    /// Triangles along a spiral, with a gap of `gap` near the end, in two instances.
     fn spiral(faces: usize, gap: f32) -> Scene {
         let at = |i: usize| {
             let t = i as f32 / faces as f32;
@@ -299,7 +299,7 @@ mod tests {
             for instance in &scene.instances {
                 slices.cover(instance, &scene.meshes[0], &mut Vec::new()).expect("no face has that corner");
             }
-            // Strays are outside, and reach into the outermost slices.
+            // Strays lie outside, and reach into the outermost slices.
             let slow = Slices::of(&scene, &Crowd::of(&Scene::default()), &bounds);
             let (quick, slow) = (slices.reached.covered(), slow.reached.covered());
             let differ = quick.iter().flatten().zip(slow.iter().flatten()).filter(|(a, b)| a != b);
@@ -311,7 +311,7 @@ mod tests {
         assert!(Slices::new(&bounds).cover(&scene.instances[0], &scene.meshes[0], &mut Vec::new()).is_none());
     }
 
-    /// A large mesh in many places, and some of them far away.
+    /// A large mesh in many places, some of them far away.
     fn crowd(far: f64) -> Scene {
         let mut scene = spiral(2_000, 0.0);
         let place = |i: u32| {
@@ -360,8 +360,8 @@ mod tests {
         assert_eq!(slices.holds_together(), slow.holds_together());
     }
 
-    /// Clusters of faces side by side, of any size and at any distance. Every eighth seed has meshes of many faces, each in
-    /// many places near each other, some of them too small to be looked into.
+    /// Clusters of faces side by side, of any size and at any distance. Every eighth seed has meshes of many faces, each in many
+    /// places close together, some of them too small to be examined face by face.
     fn clusters(seed: u64) -> Scene {
         let mut random = crate::math::random::Random::new(seed);
         let mut scene = Scene::default();
@@ -429,7 +429,7 @@ mod tests {
     #[test]
     fn a_face_that_is_not_looked_at_and_has_a_corner_nowhere_is_left_to_the_long_way() {
         let mut scene = spiral(2_000, 30.0);
-        // Of faces by the thousand, every second one would be looked at.
+        // With thousands of faces, the sample takes every second one.
         let last = scene.meshes[0].triangles.len() - 1;
         scene.meshes[0].positions.push(Vec3::NAN);
         scene.meshes[0].triangles[last][2] = 2_002;

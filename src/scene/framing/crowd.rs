@@ -1,4 +1,4 @@
-//! Instances of large meshes that are small beside the model: each is a part by itself, and no face of it is looked at.
+//! Crowds: instances of large meshes that are small compared to the model. Each is a part by itself, its faces not examined.
 
 use super::bounds::Bounds;
 use super::parts::{Facing, Part, area_scale, faces_of};
@@ -6,22 +6,22 @@ use crate::math::{DAffine3, DVec3};
 use crate::scene::corners::{ObjectBox, object_boxes, placed_box};
 use crate::scene::{Instance, Scene};
 
-/// Faces from which on a mesh is worth a look at what all of them have together.
+/// Number of faces above which the totals of a mesh are worth computing.
 const MANY: usize = 1024;
 
-/// Longest side of an instance that is one part, as a share of the model's: what parts off strays is far wider.
+/// Longest side of an instance that is one part, as a fraction of the model's: the gap before strays is far wider.
 const SMALL: f64 = 1.0 / 32.0;
 
-/// What the faces of each mesh have together that stands in several places and has many; nothing of others.
+/// Totals over the faces of each mesh that has many faces and several instances; `None` for other meshes.
 pub(super) struct Crowd {
     members: Vec<Option<Member>>,
 }
 
 #[derive(Clone, Copy)]
 struct Member {
-    /// Around all corners.
+    /// Box of all corners.
     bounds: ObjectBox,
-    /// Of all faces.
+    /// Area of all faces.
     area: f64,
     faces: u64,
 }
@@ -46,12 +46,12 @@ impl Crowd {
         Self { members: object_boxes(scene).into_iter().enumerate().map(member).collect() }
     }
 
-    /// Whether there are none.
+    /// Whether no mesh forms a crowd.
     pub(super) fn is_empty(&self) -> bool {
         self.members.is_empty()
     }
 
-    /// All faces of an instance as one part, the box a little too large; `None` where it is not small in `bounds`.
+    /// All faces of an instance as one part, with a box a little too large; `None` if the instance is not small in `bounds`.
     pub(super) fn part(&self, instance: &Instance, bounds: &Bounds) -> Option<Part> {
         let member = self.members.get(instance.mesh as usize)?.as_ref()?;
         let corners = placed_box(member.bounds, instance);

@@ -1,11 +1,11 @@
-//! Stepping back until everything is in the picture, and no further.
+//! Fitting a camera: stepping back until everything is in the picture, and no further.
 
 use super::{Bounds, Direction, in_world};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::scene::corners::{Outline, take_in};
 use crate::scene::{Camera, Projection, Scene};
 
-/// Which kind of camera to place.
+/// Kind of camera to place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FrameLens {
     /// A pinhole.
@@ -17,24 +17,24 @@ pub enum FrameLens {
     Orthographic,
 }
 
-/// Share of the picture's width and height that the model may fill; the rest is border.
+/// Fraction of the picture's width and height that the model may fill; the rest is border.
 const FILL: f64 = 0.92;
 
-/// Reaching further by less than this share of half the model's diagonal is left to rounding.
+/// Reach beyond the extremes, as a fraction of half the model's diagonal, that is ignored as rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// A camera that sees the model in `bounds` from `direction`, filling a picture of `aspect` width / height.
 ///
-/// The fit is to the projected vertices, not to a box or ball around them: the outermost ones touch the border on two
-/// opposite sides and are centred between the others.
+/// The fit uses the projected vertices, not a box or ball around them: the outermost ones touch the border on two opposite sides
+/// and are centred between the others.
 pub fn frame(scene: &Scene, bounds: &Bounds, direction: Direction, lens: FrameLens, aspect: f64) -> Camera {
     let mut fit = Fit::new(direction, bounds.center(), lens, aspect);
     fit.add(scene, bounds);
     fit.camera(bounds.radius())
 }
 
-/// Frames the model for a camera that goes around it, about the up axis through the middle of `bounds`: from everywhere on
-/// its way all of the model is in the picture. It begins at `direction`.
+/// Frames the model for a camera that orbits it, about the up axis through the centre of `bounds`: at every point of the orbit
+/// the whole model is in the picture. The orbit begins at `direction`.
 pub fn frame_around(scene: &Scene, bounds: &Bounds, direction: Direction, lens: FrameLens, aspect: f64) -> Camera {
     let mut fit = Fit::new(direction, bounds.center(), lens, aspect);
     let up = in_world(scene.up, DVec3::Y);
@@ -49,19 +49,19 @@ pub fn frame_around(scene: &Scene, bounds: &Bounds, direction: Direction, lens: 
     fit.camera(bounds.radius())
 }
 
-/// A camera that sees several scenes from one place, such as the frames of an animation.
+/// Fit of one camera to several scenes, such as the frames of an animation.
 pub struct Fit {
     lens: FrameLens,
     aspect: f64,
     axes: DMat3,
     camera_from_world: DMat3,
-    /// Where camera space has its origin.
+    /// Origin of camera space, in world space.
     center: DVec3,
     extremes: Extremes,
 }
 
 impl Fit {
-    /// Sees nothing yet. `center` should be near the model, and `aspect` is width / height.
+    /// A fit without contents. `center` should be near the model, and `aspect` is width / height.
     pub fn new(direction: Direction, center: DVec3, lens: FrameLens, aspect: f64) -> Self {
         let axes = axes(direction);
         let aspect = if aspect.is_finite() && aspect > 0.0 { aspect } else { 1.0 };
@@ -76,7 +76,7 @@ impl Fit {
         Self { lens, aspect, axes, camera_from_world: axes.transpose(), center, extremes }
     }
 
-    /// Takes in the model in `bounds`.
+    /// Takes in the model within `bounds`.
     pub fn add(&mut self, scene: &Scene, bounds: &Bounds) {
         let (camera_from_world, center) = (self.camera_from_world, self.center);
         let add = |extremes: &mut Extremes, p: DVec3, radius: f64| {
@@ -85,7 +85,7 @@ impl Fit {
         self.extremes = Fitted { bounds, extremes: self.extremes, add }.all(scene);
     }
 
-    /// The camera for all that was taken in; `radius` says how large that is.
+    /// Returns the camera for everything taken in, whose radius is `radius`.
     pub fn camera(mut self, radius: f64) -> Camera {
         if self.extremes.near == f64::NEG_INFINITY {
             self.extremes.add(DVec3::ZERO, radius);
@@ -112,8 +112,8 @@ fn axes(direction: Direction) -> DMat3 {
     DMat3::from_cols(x, z.cross(x), z)
 }
 
-/// What a camera is fitted to: calls of `add` with the place and radius of every ball of the model in `bounds`. Vertices
-/// have the radius 0; those that reach no further than others do by more than rounding may be left out.
+/// Collects the extremes of a model: calls `add` with centre and radius of every ball of the model in `bounds`. Vertices have
+/// radius 0; those that reach no further than others by more than rounding may be left out.
 #[derive(Clone)]
 struct Fitted<'a, F> {
     bounds: &'a Bounds,
@@ -130,7 +130,7 @@ impl<F: Fn(&mut Extremes, DVec3, f64) + Clone + Send + Sync> Fitted<'_, F> {
         for cone in &scene.cones {
             let (lo, hi) = cone.bounds();
             if self.bounds.contains((lo + hi) * 0.5) {
-                // Balls around the ends hold the mantle; those of a wide flat one reach too far.
+                // Balls around the ends enclose the lateral surface; those of a wide flat cone reach too far.
                 (self.add)(&mut self.extremes, cone.base, cone.base_radius);
                 (self.add)(&mut self.extremes, cone.apex, cone.apex_radius);
             }
@@ -157,7 +157,7 @@ impl<F: Fn(&mut Extremes, DVec3, f64) + Clone + Send + Sync> Outline for Fitted<
     }
 }
 
-/// How far the model reaches past planes through the origin of camera space that lean like the sides of the picture.
+/// Reach of the model beyond planes through the origin of camera space that are inclined like the sides of the view frustum.
 ///
 /// Right, left, top, bottom: the greatest `±x + slope·z`, `±y + slope·z`, z towards the eye; and the greatest z.
 #[derive(Clone, Copy)]
@@ -165,19 +165,19 @@ struct Extremes {
     sides: [f64; 4],
     near: f64,
     slopes: (f64, f64),
-    /// How long normals of these planes are: a ball reaches past one by its radius times that.
+    /// Lengths of these planes' normals: a ball reaches past a plane by its radius times the length.
     lengths: (f64, f64),
 }
 
 impl Extremes {
-    /// The extents of nothing.
+    /// Extremes without contents.
     fn none(slopes: (f64, f64)) -> Self {
         let length = |slope: f64| (1.0 + slope * slope).sqrt();
         let lengths = (length(slopes.0), length(slopes.1));
         Self { sides: [f64::NEG_INFINITY; 4], near: f64::NEG_INFINITY, slopes, lengths }
     }
 
-    /// Takes in what another has taken in.
+    /// Takes in everything that another has taken in.
     fn join(&mut self, other: &Self) {
         for (side, other) in self.sides.iter_mut().zip(other.sides) {
             *side = side.max(other);
@@ -185,7 +185,7 @@ impl Extremes {
         self.near = self.near.max(other.near);
     }
 
-    /// Whether none reaches further than that of `other` by more than `slack`; `false` where one is no number.
+    /// Whether no extreme exceeds that of `other` by more than `slack`; `false` if one is NaN.
     fn reach_no_further(&self, other: &Self, slack: f64) -> bool {
         let sides = self.sides.iter().zip(other.sides);
         sides.chain([(&self.near, other.near)]).all(|(reach, other)| *reach <= other + slack)
@@ -202,11 +202,11 @@ impl Extremes {
         self.near = self.near.max(p.z + radius);
     }
 
-    /// Takes in a ball, or a point of radius 0, wherever it goes on a circle about `up` (a unit vector in camera space):
-    /// `height` along it from the origin, and `distance` from the axis.
+    /// Takes in a ball, or a point of radius 0, at every point of a circle about `up` (a unit vector in camera space): `height`
+    /// along it from the origin, and `distance` from the axis.
     fn add_ring(&mut self, up: DVec3, height: f64, distance: f64, radius: f64) {
         let (sx, sy) = self.slopes;
-        // A plane's normal points along the axis in part; the rest of it is met somewhere on the circle.
+        // The component of a plane's normal along the axis is the same all around; the rest is aligned somewhere on the circle.
         let reach = |n: DVec3| {
             let along = n.dot(up);
             let across = (n.length_squared() - along * along).max(0.0).sqrt();
@@ -219,18 +219,18 @@ impl Extremes {
         self.near = self.near.max(reach(DVec3::Z));
     }
 
-    /// The nearest eye whose four leaning planes leave nothing outside, centred where there is room.
+    /// The nearest eye whose frustum contains everything, centred where there is room.
     fn pinhole(&self, radius: f64) -> DVec3 {
         let [right, left, top, bottom] = self.sides;
         let (sx, sy) = self.slopes;
         let distance = ((right + left) / (2.0 * sx)).max((top + bottom) / (2.0 * sy));
-        // A model without extent across the view is looked at from its own radius away.
+        // A model without extent across the view is viewed from its own radius away.
         let z = distance.max(self.near + 1e-3 * radius);
         let z = if distance > self.near + 1e-9 * radius { z } else { self.near + radius };
         DVec3::new((right - left) * 0.5, (top - bottom) * 0.5, z)
     }
 
-    /// The middle of the model in front of it, and half the height to see.
+    /// An eye in front of the centre of the model, and half the height of the view.
     fn parallel(&self, radius: f64, aspect: f64) -> (DVec3, f64) {
         let [right, left, top, bottom] = self.sides;
         let half = ((top + bottom) * 0.5).max((right + left) * 0.5 / aspect) / FILL;

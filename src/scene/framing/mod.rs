@@ -1,7 +1,7 @@
-//! Choosing a camera for a scene that brings none: from which side, how far away, and of what.
+//! Choosing a camera for a scene without one: direction, distance, and the part of the scene to frame.
 //!
-//! [`robust_bounds`] finds the model and leaves stray geometry out, [`NamedView`] and [`default_direction`] say from where
-//! to look, and [`frame`] steps back just far enough. The result is an ordinary [`Camera`], as if the file had brought it.
+//! [`robust_bounds`] finds the model and leaves out stray geometry, [`NamedView`] and [`default_direction`] give the viewing
+//! direction, and [`frame`] steps back just far enough. The result is an ordinary [`Camera`], as if it were in the file.
 
 mod bounds;
 mod crowd;
@@ -16,25 +16,25 @@ use super::{Camera, Scene, UpAxis};
 use crate::math::{DAffine3, DQuat, DVec3};
 use crate::named::names;
 
-/// Vertical field of view when nothing else is asked for, radians (30°: a portrait lens, little distortion).
+/// Default vertical field of view, radians (30°: a portrait lens, little distortion).
 pub const DEFAULT_FOV: f64 = std::f64::consts::PI / 6.0;
 
-/// The sides a model can be seen from. Its front is +Z in a Y-up scene, as glTF says, and −Y in a Z-up one.
+/// Named viewing directions. The front of a model is +Z in a Y-up scene, as in glTF, and −Y in a Z-up one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum NamedView {
-    /// Sees the front.
+    /// Shows the front.
     Front,
-    /// Sees the back.
+    /// Shows the back.
     Back,
-    /// Sees the model's −X side.
+    /// Shows the model's −X side.
     Left,
-    /// Sees the model's +X side.
+    /// Shows the model's +X side.
     Right,
-    /// Sees it from above, the front at the bottom of the picture.
+    /// Shows the model from above, its front at the bottom of the picture.
     Top,
-    /// Sees it from below, the front at the top of the picture.
+    /// Shows the model from below, its front at the top of the picture.
     Bottom,
-    /// Sees the front, +X and upper sides at equal angles.
+    /// Shows the front, +X and upper sides at equal angles.
     Iso,
 }
 
@@ -50,7 +50,7 @@ names!(
 );
 
 impl NamedView {
-    /// Where it looks from.
+    /// Viewing direction in a scene with this up axis.
     pub fn direction(self, up: UpAxis) -> Direction {
         let (from, top) = match self {
             Self::Front => (DVec3::Z, DVec3::Y),
@@ -65,12 +65,12 @@ impl NamedView {
     }
 }
 
-/// From where to look, and what is up in the picture; world space.
+/// A viewing direction, and the up direction of the picture; world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Direction {
     /// Unit vector from the model to the eye.
     pub from: DVec3,
-    /// Towards the top of the picture.
+    /// Direction towards the top of the picture.
     pub up: DVec3,
 }
 
@@ -80,7 +80,7 @@ impl Direction {
         Self { from: in_world(up, from.normalize_or(DVec3::Z)), up: in_world(up, top) }
     }
 
-    /// `azimuth` from the front towards +X and `elevation` above the horizon, radians.
+    /// Direction at `azimuth` from the front towards +X and `elevation` above the horizon, radians.
     pub fn around(up: UpAxis, azimuth: f64, elevation: f64) -> Self {
         let (flat, height) = (libm::cos(elevation), libm::sin(elevation));
         let from = DVec3::new(flat * libm::sin(azimuth), height, flat * libm::cos(azimuth));
@@ -88,19 +88,20 @@ impl Direction {
     }
 }
 
-/// Where the default view stands: to the right of the front and a little above.
+/// Default viewing angles, degrees: to the right of the front and a little above.
 const AZIMUTH: f64 = 28.0;
 const ELEVATION: f64 = 18.0;
 
-/// How thin a model is seen face on (thickness / middle extent), and how thick one is seen from the default side.
+/// Relative thickness (thickness / middle extent) up to which a model is viewed face on, and from which it is viewed at the
+/// default angles.
 const CARD: f64 = 0.04;
 const SOLID: f64 = 0.4;
 
-/// Elevation from which models flatter than high are seen: terrain, floor plans.
+/// Elevation, degrees, for models that are flat on the ground: terrain, floor plans.
 const LANDSCAPE_ELEVATION: f64 = 38.0;
 
 impl Direction {
-    /// This direction for a scene that may face back.
+    /// Adapts this direction to a scene that may face backwards.
     fn towards_front(self, scene: &Scene) -> Self {
         if !scene.faces_back {
             return self;
@@ -111,21 +112,20 @@ impl Direction {
     }
 }
 
-/// From which side a view sees a scene.
+/// Direction of a named view of a scene.
 pub fn named_direction(scene: &Scene, view: NamedView) -> Direction {
     view.direction(scene.up).towards_front(scene)
 }
 
-/// From where a model looks good when nobody says.
+/// Viewing direction that suits a model when none is given.
 ///
-/// A three-quarter view, slightly from above. Cards, panels and rows of test objects are looked at face on, from the side
-/// their faces turn to, and things between card and solid from in between; a model that is flat on the ground is seen
-/// from higher up.
+/// A three-quarter view, slightly from above. Cards, panels and rows of test objects are viewed face on, from the side that their
+/// faces turn to, and models between card and solid from in between; a model that is flat on the ground is viewed from higher up.
 pub fn default_direction(scene: &Scene, bounds: &Bounds) -> Direction {
     by_extent(scene, bounds).towards_front(scene)
 }
 
-/// The default direction of a scene that does not face back.
+/// Default direction of a scene, as if it did not face backwards.
 fn by_extent(scene: &Scene, bounds: &Bounds) -> Direction {
     // The model's extents in the Y-up frame.
     let extent = in_studio(scene.up, bounds.hi - bounds.lo).abs();
@@ -133,7 +133,7 @@ fn by_extent(scene: &Scene, bounds: &Bounds) -> Direction {
     let turn = |thin: f64, other: f64| ((thin / other - CARD) / (SOLID - CARD)).clamp(0.0, 1.0);
     let (azimuth, elevation) = (AZIMUTH.to_radians(), ELEVATION.to_radians());
 
-    // Asked of what is thin: what is solid has faces on all sides.
+    // Evaluated only for thin models: solid ones have faces on all sides.
     let facing = |axis: DVec3| {
         let there = Direction { from: in_world(scene.up, axis), up: DVec3::ZERO }.towards_front(scene).from;
         parts::facing(scene).dot(there)
@@ -161,7 +161,7 @@ fn by_extent(scene: &Scene, bounds: &Bounds) -> Direction {
     }
 }
 
-/// A camera that has gone around the up axis through `pivot` by `angle`, radians, from the front towards +X.
+/// The camera after an orbit around the up axis through `pivot` by `angle`, radians, from the front towards +X.
 pub fn turned(camera: &Camera, up: UpAxis, pivot: DVec3, angle: f64) -> Camera {
     let axis = in_world(up, DVec3::Y);
     let turn = DQuat::from_vec4((axis * libm::sin(0.5 * angle)).extend(libm::cos(0.5 * angle)));
@@ -169,10 +169,10 @@ pub fn turned(camera: &Camera, up: UpAxis, pivot: DVec3, angle: f64) -> Camera {
     Camera { world_from_camera: about * camera.world_from_camera, ..camera.clone() }
 }
 
-/// The camera of a picture nobody directed: the one the scene file chose, else [`default_direction`] framed for a picture
-/// of `aspect` width / height.
+/// Default camera of a picture: the one that the scene file chose, else [`default_direction`] framed for a picture of `aspect`
+/// width / height.
 ///
-/// Cameras of a model are left alone: they were placed for other pictures, and often see little of it.
+/// Cameras of a model are ignored: they were placed for other pictures, and often show little of it.
 pub fn default_camera(scene: &Scene, bounds: &Bounds, aspect: f64) -> Camera {
     let chosen = scene.hints.camera.and_then(|i| scene.cameras.get(i as usize));
     chosen.cloned().unwrap_or_else(|| {
@@ -181,7 +181,7 @@ pub fn default_camera(scene: &Scene, bounds: &Bounds, aspect: f64) -> Camera {
     })
 }
 
-/// From the Y-up, front-+Z frame to the world.
+/// Transforms from the Y-up, front-+Z frame to the world.
 fn in_world(up: UpAxis, v: DVec3) -> DVec3 {
     match up {
         UpAxis::Y => v,
@@ -189,7 +189,7 @@ fn in_world(up: UpAxis, v: DVec3) -> DVec3 {
     }
 }
 
-/// From the world to the Y-up, front-+Z frame.
+/// Transforms from the world to the Y-up, front-+Z frame.
 fn in_studio(up: UpAxis, v: DVec3) -> DVec3 {
     match up {
         UpAxis::Y => v,

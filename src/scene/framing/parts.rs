@@ -1,4 +1,4 @@
-//! What a model is made of, looked at one by one: faces, spheres and cones in world space.
+//! Parts of a model, visited one by one: faces, spheres and cones in world space.
 
 use super::bounds::Bounds;
 use super::crowd::Crowd;
@@ -7,21 +7,21 @@ use crate::scene::mesh::normal_from_object;
 use crate::scene::{Mesh, Scene};
 use rayon::prelude::*;
 
-/// Facing is told apart from not facing by this much: closed bodies, whose faces cancel, face no way.
+/// Facing along an axis below which a model faces away; negative, as closed bodies, whose normals cancel, face in no direction.
 pub(super) const AWAY: f64 = -0.1;
 
-/// Triangles there are, polygons counted as their fans.
+/// Number of triangles in a scene, polygons counted as their fans.
 pub(super) fn faces(scene: &Scene) -> u64 {
     scene.instances.iter().filter_map(|instance| scene.meshes.get(instance.mesh as usize)).map(faces_of).sum()
 }
 
-/// The same of a mesh.
+/// Number of triangles in a mesh, likewise.
 pub(super) fn faces_of(mesh: &Mesh) -> u64 {
     let fans = mesh.polygons.iter().map(|polygon| u64::from(polygon.len.saturating_sub(2)));
     mesh.triangles.len() as u64 + fans.sum::<u64>()
 }
 
-/// The mean direction of all faces weighted by area: length 1 for a card, 0 for a closed body.
+/// Mean normal of all faces, weighted by area: length 1 for a card, 0 for a closed body.
 pub(super) fn facing(scene: &Scene) -> DVec3 {
     let mut own: Vec<Option<Facing>> = vec![None; scene.meshes.len()];
     let mut all = Facing::default();
@@ -41,16 +41,16 @@ pub(super) fn facing(scene: &Scene) -> DVec3 {
     if all.area > 0.0 { all.normal / all.area } else { DVec3::ZERO }
 }
 
-/// Which way faces look.
+/// Area-weighted sum of face normals.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Facing {
-    /// The sum of their normals, each as long as the area of its face.
+    /// Sum of the normals, each as long as the area of its face.
     normal: DVec3,
     pub area: f64,
 }
 
 impl Facing {
-    /// Of the faces of a mesh that stands somewhere.
+    /// Sums over the faces of a placed mesh.
     pub(super) fn of(mesh: &Mesh, world_from_object: &DAffine3) -> Self {
         let mut all = Self::default();
         let add = |all: &mut Self, part: &Part| all.join(Self { normal: part.normal, area: part.area });
@@ -68,7 +68,7 @@ impl Facing {
     }
 }
 
-/// What areas grow by where a matrix makes all of them grow alike; `None` where it does not.
+/// Factor by which a matrix scales areas if it scales all of them alike; `None` otherwise.
 pub(super) fn area_scale(m: &DMat3) -> Option<f64> {
     let squares = DVec3::from(m.to_cols_array_2d().map(|axis| DVec3::from(axis).length_squared()));
     let across = DVec3::new(m.x_axis.dot(m.y_axis), m.y_axis.dot(m.z_axis), m.z_axis.dot(m.x_axis));
@@ -82,23 +82,23 @@ pub(super) struct Part {
     pub lo: DVec3,
     pub hi: DVec3,
     pub center: DVec3,
-    /// As long as the area.
+    /// Normal, as long as the area.
     pub normal: DVec3,
     pub area: f64,
-    /// How many faces, spheres or cones it is.
+    /// Number of faces, spheres or cones in the part.
     pub faces: u64,
 }
 
-/// Which parts are looked at.
+/// Granularity of the parts that are visited.
 #[derive(Clone, Copy)]
 pub(super) enum Granularity<'a> {
     /// Each face.
     Faces,
-    /// Each face, but instances that are small in these bounds as one.
+    /// Each face, but instances that are small in these bounds as one part.
     Crowd(&'a Crowd, &'a Bounds),
 }
 
-/// Box of the parts that `keep` wants; `None` when there are none.
+/// Box of the parts that `keep` selects; `None` if there are none.
 pub(super) fn hull(
     scene: &Scene,
     granularity: Granularity,
@@ -115,10 +115,10 @@ pub(super) fn hull(
     lo.cmple(hi).all().then_some((lo, hi))
 }
 
-/// Faces that one thread takes at a time: the same for every number of threads, so that sums are, too.
+/// Faces per parallel task: independent of the number of threads, so that sums are, too.
 pub(super) const CHUNK: usize = 1 << 15;
 
-/// Adds up every face, sphere and cone with finite corners, from `nothing`; `join` adds what others have added up.
+/// Sums over every face, sphere and cone with finite corners, starting from `nothing`; `join` combines partial sums.
 pub(super) fn gather<T: Send>(
     (scene, granularity): (&Scene, Granularity),
     nothing: impl Fn() -> T + Sync,
@@ -140,7 +140,7 @@ pub(super) fn gather<T: Send>(
     all
 }
 
-/// The same of the faces of a mesh that stands somewhere, to `all`.
+/// Adds the faces of a placed mesh to `all` in the same way.
 fn gather_faces<T: Send>(
     (mesh, world_from_object): (&Mesh, &DAffine3),
     all: &mut T,
@@ -153,17 +153,17 @@ fn gather_faces<T: Send>(
         let place = |i: u32| mesh.positions.get(i as usize).map_or(origin, |p| p.as_dvec3());
         return Faces { mesh, place }.gather(all, nothing, add, join);
     }
-    // Faces share their corners.
+    // Corners are shared between faces, so each is placed once.
     let world = |p: &Vec3| world_from_object.transform_point3(p.as_dvec3());
     let places: Vec<DVec3> = mesh.positions.par_iter().with_min_len(CHUNK).map(world).collect();
     let place = |i: u32| places.get(i as usize).copied().unwrap_or(origin);
     Faces { mesh, place }.gather(all, nothing, add, join);
 }
 
-/// The faces of an instance.
+/// Faces of an instance.
 struct Faces<'a, P> {
     mesh: &'a Mesh,
-    /// Where vertices are, world space; where the instance is, if there is none of a number.
+    /// Position of a vertex, world space; that of the instance if there is no such vertex.
     place: P,
 }
 
@@ -196,7 +196,7 @@ impl<P: Fn(u32) -> DVec3 + Sync> Faces<'_, P> {
         }
     }
 
-    /// A polygon counts as the fan of triangles around its first corner.
+    /// Visits polygons as fans of triangles around their first corners.
     fn visit_polygons(&self, mut f: impl FnMut(&Part)) {
         for polygon in &self.mesh.polygons {
             let run = polygon.first as usize..(polygon.first + polygon.len) as usize;
@@ -209,19 +209,19 @@ impl<P: Fn(u32) -> DVec3 + Sync> Faces<'_, P> {
 }
 
 impl Part {
-    /// `None` where a corner is nowhere. Inlined, so that what nobody asks for is not worked out.
+    /// Part of a triangle; `None` if a corner is not finite. Inlined, so that unused results are not computed.
     #[inline(always)]
     fn face([a, b, c]: [DVec3; 3]) -> Option<Self> {
         let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
         let normal = (b - a).cross(c - a) * 0.5;
-        // The mean of three equal numbers may be another.
+        // The mean of three equal numbers may differ from them by rounding.
         let center = ((a + b + c) / 3.0).clamp(lo, hi);
         let face = Self { lo, hi, center, normal, area: normal.length(), faces: 1 };
         (lo.is_finite() && hi.is_finite()).then_some(face)
     }
 }
 
-/// Every sphere and cone.
+/// All spheres and cones.
 pub(super) fn solids(scene: &Scene) -> impl Iterator<Item = Part> {
     let spheres = scene.spheres.iter().map(|sphere| {
         let (lo, hi) = (sphere.center - sphere.radius, sphere.center + sphere.radius);

@@ -1,4 +1,4 @@
-//! Space in slices along each axis: how much of a model lies in each, which are empty, and which ends come off.
+//! Slices of space along each axis: how much of a model lies in each, which are empty, and which ends come off.
 
 use super::bounds::Bounds;
 use super::crowd::Crowd;
@@ -7,35 +7,35 @@ use crate::math::{DVec3, Vec3};
 use crate::scene::{Instance, Mesh, Scene};
 use rayon::prelude::*;
 
-/// Strays together own at most this share of the area.
+/// Strays together have at most this fraction of the area.
 const STRAY_AREA: f64 = 0.01;
-/// Strays together are at most this share of the faces.
+/// Strays together have at most this fraction of the faces.
 const STRAY_COUNT: f64 = 0.1;
-/// Strays lie beyond an empty gap of at least this share of the model's size.
+/// Strays lie beyond an empty gap of at least this fraction of the model's size.
 const GAP: f64 = 0.5;
 
-/// Slices a box is cut into along each axis to look for gaps.
+/// Number of slices of a box along each axis, in which gaps are looked for.
 const SLICES: usize = 256;
 
-/// Triangles of a mesh are noted in so many rounds, one from all over it after the other: the first mostly leaves no gap.
+/// Rounds in which the triangles of a mesh are recorded, each a sample from all over it: the first mostly leaves no gap.
 const ROUNDS: usize = 8;
-/// So few are noted at once: asking would take longer.
+/// Number of triangles up to which all are recorded in one round, because testing for gaps would take longer.
 const FEW: usize = 1 << 10;
 
-/// How much of the model lies in each slice along each axis.
+/// Contents of each slice along each axis.
 pub(super) struct Slices {
     lo: DVec3,
     width: DVec3,
-    /// Slices to a unit of length; 0 where the box is flat.
+    /// Slices per unit of length; 0 where the box is flat.
     per_unit: DVec3,
     pub(super) reached: Reached,
-    /// Per axis and slice: area and faces of the parts with their centre there.
+    /// Area and faces of the parts centred in each slice of each axis.
     area: [[f64; SLICES]; 3],
     count: [[u64; SLICES]; 3],
 }
 
 impl Slices {
-    /// Cuts the box of `bounds`.
+    /// Empty slices of the box of `bounds`.
     pub(super) fn new(bounds: &Bounds) -> Self {
         let width = (bounds.hi - bounds.lo) / SLICES as f64;
         Self {
@@ -48,7 +48,7 @@ impl Slices {
         }
     }
 
-    /// Sorts the parts inside the box into its slices.
+    /// Sorts the parts whose centre is inside the box into its slices.
     pub(super) fn of(scene: &Scene, crowd: &Crowd, bounds: &Bounds) -> Self {
         let add = |slices: &mut Self, part: &Part| {
             if bounds.contains(part.center) {
@@ -59,7 +59,7 @@ impl Slices {
         gather((scene, Granularity::Crowd(crowd, bounds)), || Self::new(bounds), add, Self::join)
     }
 
-    /// Adds what other slices of the same box have.
+    /// Adds the contents of other slices of the same box.
     fn join(&mut self, other: Self) {
         self.reached.join(&other.reached);
         for axis in 0..3 {
@@ -70,7 +70,7 @@ impl Slices {
         }
     }
 
-    /// Notes that a part with this box reaches from slice to slice.
+    /// Records the range of slices that a part with this box reaches.
     #[inline]
     pub(super) fn reach(&mut self, lo: DVec3, hi: DVec3) {
         for axis in 0..3 {
@@ -78,10 +78,10 @@ impl Slices {
         }
     }
 
-    /// Notes how far every triangle of a mesh reaches, or some from all over it where these leave no gap; `None` when a
-    /// corner of one is nowhere.
+    /// Records the reach of every triangle of a mesh, or of a sample from all over it if that leaves no gap; `None` if a corner
+    /// of one is missing or not finite.
     ///
-    /// `cells` is room for the slices that its vertices are in.
+    /// `cells` is a buffer for the slices of the vertices.
     pub(super) fn cover(&mut self, instance: &Instance, mesh: &Mesh, cells: &mut Vec<VertexCell>) -> Option<()> {
         let cell = |p: &Vec3| {
             let p = instance.world_from_object.transform_point3(p.as_dvec3());
@@ -113,7 +113,7 @@ impl Slices {
         Some(())
     }
 
-    /// Notes `faces` of something with these outermost points, somewhere between which they reach.
+    /// Records `faces` faces that reach somewhere between these outermost points.
     pub(super) fn cover_between(&mut self, outermost: &[DVec3], faces: u64) {
         for axis in 0..3 {
             let (first, last) = self.slices_between(axis, outermost);
@@ -121,13 +121,13 @@ impl Slices {
         }
     }
 
-    /// Whether no slice is empty, so that nothing can come off; where the box is flat, nothing can either.
+    /// Whether no slice is empty, so that nothing can come off; along axes where the box is flat, nothing can either.
     pub(super) fn has_no_gap(&self) -> bool {
         let covered = self.reached.covered();
         self.wide_axes().all(|axis| covered[axis].iter().all(|&covered| covered))
     }
 
-    /// Whether too many faces lie before the first empty slice from every end for any to come off.
+    /// Whether too many faces lie before the first empty slice, from either end of every axis, for any to come off.
     pub(super) fn holds_together(&self) -> bool {
         self.wide_axes().all(|axis| self.reached.least_before_a_gap(axis) > STRAY_COUNT)
     }
@@ -137,7 +137,7 @@ impl Slices {
         (0..3).filter(|&axis| self.per_unit[axis] != 0.0)
     }
 
-    /// Whether all slices that something with these outermost points could reach into are among those `covered`.
+    /// Whether all slices between these outermost points are among those `covered`.
     pub(super) fn lies_throughout(&self, covered: &Covered, outermost: &[DVec3]) -> bool {
         (0..3).all(|axis| {
             let (first, last) = self.slices_between(axis, outermost);
@@ -145,13 +145,13 @@ impl Slices {
         })
     }
 
-    /// The first and last slice that something with these outermost points may reach into.
+    /// First and last slice between these outermost points.
     fn slices_between(&self, axis: usize, outermost: &[DVec3]) -> (usize, usize) {
         let places = || outermost.iter().map(|p| self.slice(axis, p[axis]));
         (places().min().unwrap_or(0), places().max().unwrap_or(0))
     }
 
-    /// Adds a part to the slices that its middle is in.
+    /// Adds a part to the slices of its centre.
     fn weigh(&mut self, part: &Part) {
         for axis in 0..3 {
             let middle = self.slice(axis, part.center[axis]);
@@ -160,7 +160,7 @@ impl Slices {
         }
     }
 
-    /// Faces of parts whose middle is in the box.
+    /// Number of faces of parts whose centre is in the box.
     pub(super) fn parts(&self) -> u64 {
         self.count[0].iter().sum()
     }
@@ -168,13 +168,13 @@ impl Slices {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the slices there are")]
     #[inline]
     fn slice(&self, axis: usize, x: f64) -> usize {
-        // In 32 bits, which processors convert to at once.
+        // Converts to 32 bits, for which processors have an instruction.
         ((x - self.lo[axis]) * self.per_unit[axis]).clamp(0.0, (SLICES - 1) as f64) as u32 as usize
     }
 
-    /// First and last slice along each axis without the ends that come off; `None` when nothing comes off.
+    /// First and last slice kept along each axis when the stray ends are cut off; `None` if nothing comes off.
     ///
-    /// Slices, not coordinates: beside a stray at 1e20 the model's own box could not be told from its centre.
+    /// Slices, not coordinates: with a stray at 1e20, the model's own box would collapse to its centre.
     pub(super) fn core(&self) -> Option<[(usize, usize); 3]> {
         let size = (0..3).map(|axis| self.size(axis)).fold(0.0, f64::max);
         let covered = self.reached.covered();
@@ -189,7 +189,7 @@ impl Slices {
         (0..3).all(|axis| (core[axis].0..=core[axis].1).contains(&self.slice(axis, p[axis])))
     }
 
-    /// Length along `axis` of the middle 98 % of the area, to a slice.
+    /// Length along `axis` of the middle 98 % of the area, rounded up to slices.
     fn size(&self, axis: usize) -> f64 {
         let total: f64 = self.area[axis].iter().sum();
         let reach = |from_end: fn(usize) -> usize| {
@@ -205,7 +205,7 @@ impl Slices {
         }
     }
 
-    /// How many slices come off one end of `axis`; `from_end` numbers them from there.
+    /// Number of slices that come off one end of `axis`; `from_end` maps indices counted from that end.
     fn cut(&self, axis: usize, (size, covered): (f64, &[bool; SLICES]), from_end: impl Fn(usize) -> usize) -> usize {
         let total_area: f64 = self.area[axis].iter().sum();
         let total_count: u64 = self.count[axis].iter().sum();
@@ -230,13 +230,13 @@ impl Slices {
     }
 }
 
-/// The slice along each axis that a vertex is in; `None` where it is nowhere.
+/// Slice of a vertex along each axis; `None` if it is not finite.
 pub(super) type VertexCell = Option<[u8; 3]>;
 
-/// For each axis and slice whether some part reaches into it.
+/// Whether any part reaches into each slice of each axis.
 pub(super) type Covered = [[bool; SLICES]; 3];
 
-/// Which slices parts reach into, as how many begin and how many end in each: noted without a branch.
+/// Slices reached by parts, stored as the number of parts that begin and end in each: recorded without a branch.
 #[derive(Clone, Copy)]
 pub(super) struct Reached {
     begin: [[u64; SLICES]; 3],
@@ -250,15 +250,15 @@ impl Default for Reached {
 }
 
 impl Reached {
-    /// So many parts reach from slice to slice of an axis.
+    /// Records that `parts` parts reach from slice `first` to slice `last` of an axis.
     #[inline]
     fn note(&mut self, axis: usize, first: usize, last: usize, parts: u64) {
-        // What is inside out reaches as far.
+        // Swapped ends reach as far.
         self.begin[axis][first.min(last)] += parts;
         self.end[axis][first.max(last)] += parts;
     }
 
-    /// Notes triangles whose vertices are in these cells; `None` where one is nowhere.
+    /// Records triangles whose vertices are in these cells; `None` if one is missing or not finite.
     fn note_all<'t>(&mut self, triangles: impl Iterator<Item = &'t [u32; 3]>, cells: &[VertexCell]) -> Option<()> {
         for triangle in triangles {
             let [a, b, c] = triangle.map(|i| cells.get(i as usize).copied().flatten());
@@ -271,7 +271,7 @@ impl Reached {
         Some(())
     }
 
-    /// Adds what others reach.
+    /// Adds the reach recorded elsewhere.
     fn join(&mut self, other: &Self) {
         for (mine, other) in [(&mut self.begin, &other.begin), (&mut self.end, &other.end)] {
             let pairs = mine.as_flattened_mut().iter_mut().zip(other.as_flattened());
@@ -279,7 +279,7 @@ impl Reached {
         }
     }
 
-    /// Whether some part reaches into a slice.
+    /// Which slices some part reaches into.
     pub(super) fn covered(&self) -> Covered {
         [0, 1, 2].map(|axis| {
             let mut open = 0;
@@ -292,14 +292,14 @@ impl Reached {
         })
     }
 
-    /// Adds the slices that some part reaches into to others.
+    /// Adds the slices that some part reaches into to `covered`.
     pub(super) fn add_covered(&self, covered: &mut Covered) {
         let pairs = covered.as_flattened_mut().iter_mut().zip(self.covered().into_iter().flatten());
         pairs.for_each(|(covered, more)| *covered |= more);
     }
 
-    /// The part of all that lies before the first empty slice of an axis, from the end where that is less; 1 where no slice
-    /// is empty.
+    /// Fraction of all parts that lies before the first empty slice of an axis, or behind the last one if that is less; 1 if no
+    /// slice is empty.
     fn least_before_a_gap(&self, axis: usize) -> f64 {
         let covered = &self.covered()[axis];
         let (Some(first), Some(last)) = (covered.iter().position(|c| !c), covered.iter().rposition(|c| !c)) else {

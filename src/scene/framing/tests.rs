@@ -3,14 +3,14 @@ use crate::math::{DAffine3, Vec3};
 use crate::render::View;
 use crate::scene::{Instance, Mesh, Sphere};
 
-/// A scene with one mesh of the given triangles.
+/// A scene of one mesh with the given triangles.
 fn mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Scene {
     let mesh = Mesh { positions, triangles, ..Mesh::default() };
     let instance = Instance { name: String::new(), mesh: 0, world_from_object: DAffine3::IDENTITY };
     Scene { meshes: vec![mesh], instances: vec![instance], ..Scene::default() }
 }
 
-/// A box from `lo` to `hi`, every side cut into `n × n` squares.
+/// A box from `lo` to `hi`, with every side cut into `n × n` squares.
 fn block(lo: Vec3, hi: Vec3, n: u32) -> Scene {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     for axis in 0..3 {
@@ -34,7 +34,7 @@ fn block(lo: Vec3, hi: Vec3, n: u32) -> Scene {
     mesh(positions, triangles)
 }
 
-/// `scene` with a small triangle added at `place`.
+/// Adds a small triangle at `place` to `scene`.
 fn with_triangle(mut scene: Scene, place: Vec3, size: f32) -> Scene {
     let mesh = &mut scene.meshes[0];
     let base = mesh.positions.len() as u32;
@@ -43,7 +43,7 @@ fn with_triangle(mut scene: Scene, place: Vec3, size: f32) -> Scene {
     scene
 }
 
-/// Where the outermost points of the model appear: least and greatest x and y, in half picture heights.
+/// Projection of the outermost points of the model: least and greatest x and y, in half picture heights.
 fn seen(scene: &Scene, camera: &Camera) -> (DVec3, DVec3) {
     let view = View::from_camera(camera);
     let points = scene.meshes[0].positions.iter().map(|p| view.project(p.as_dvec3()));
@@ -175,7 +175,7 @@ fn named_views_look_at_the_side_they_name() {
     ] {
         assert_eq!(view.direction(UpAxis::Y), Direction { from, up: top });
     }
-    // Z-up programs have their front at −y.
+    // Z-up programs have the front of models at −y.
     assert_eq!(NamedView::Front.direction(UpAxis::Z), Direction { from: DVec3::NEG_Y, up: DVec3::Z });
     assert_eq!(NamedView::Top.direction(UpAxis::Z), Direction { from: DVec3::Z, up: DVec3::Y });
     for view in NamedView::ALL {
@@ -192,7 +192,7 @@ fn a_card_is_looked_at_face_on_from_the_side_it_faces() {
     let from = |scene: &Scene| default_direction(scene, &robust_bounds(scene)).from;
     assert!((from(&card([0, 1, 2])) - DVec3::Z).length() < 1e-12);
     assert!((from(&card([2, 1, 0])) - DVec3::NEG_Z).length() < 1e-12);
-    // Mirrored ones keep their front, scaled evenly or not.
+    // Mirrored cards keep their front, scaled evenly or not.
     for scale in [DVec3::new(-1.0, 1.0, 1.0), DVec3::new(-1.0, 1.5, 1.0)] {
         let mut mirrored = card([0, 1, 2]);
         mirrored.instances[0].world_from_object = DAffine3::from_scale(scale);
@@ -233,7 +233,7 @@ fn a_crowd_is_framed_as_closely_as_if_each_corner_had_been_looked_at() {
         Instance { name: String::new(), mesh: 0, world_from_object }
     };
     crowd.instances = (0..300).map(placed).collect();
-    // The same as one mesh, of which every corner is looked at.
+    // The same as a single mesh, every corner of which is examined.
     let mut melted = mesh(Vec::new(), Vec::new());
     for instance in &crowd.instances {
         let base = melted.meshes[0].positions.len() as u32;
