@@ -1,7 +1,7 @@
 //! A mesh far from the origin looks like the same mesh at the origin.
 //!
-//! At 10⁷, where maps and plants put things, single precision steps by 1: only text that is read, centred and placed in
-//! double precision keeps the shape.
+//! At 10⁷, where maps and industrial plants place objects, single precision has steps of 1: only coordinates that are read,
+//! centred and placed in double precision keep the shape.
 
 use crate::common::still;
 use meshray::accel::AccelKind;
@@ -31,7 +31,7 @@ fn animal(ring: u32, step: u32) -> [i64; 3] {
     [x, y.max(0), z]
 }
 
-/// Its OBJ text with `shift` added to every coordinate, exactly: six decimals whatever stands before them.
+/// OBJ text of the animal with `shift` added to every coordinate, exactly: six decimals whatever the integer part.
 fn text(shift: i64) -> String {
     let mut text = String::new();
     for ring in 0..=RINGS {
@@ -61,8 +61,8 @@ fn picture(text: String) -> Picture {
     still(loaded.scene, AccelKind::default(), 240, 180).unwrap()
 }
 
-/// Not bit for bit: in double precision the decimals themselves are rounded by 10⁻⁹ at 10⁷, and so is the eye's place.
-/// That is far less than a pixel, so that no code of a picture changes by more than a rounding.
+/// Not bit for bit: in double precision the decimals themselves are rounded by 10⁻⁹ at 10⁷, and so is the eye's position. That is
+/// far less than a pixel, so no pixel code changes by more than a rounding.
 #[test]
 fn an_obj_ten_million_away_gives_the_picture_of_the_one_at_the_origin() {
     let near = picture(text(0));

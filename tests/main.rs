@@ -1,6 +1,6 @@
-//! Everything that is tested from outside: the program's behaviour as a black box, and pictures against stored ones.
+//! All tests from outside: the program as a black box, and pictures against stored ones.
 //!
-//! One binary, so that it is linked once; every module is a subject.
+//! One binary, so that it is linked once; each module covers one subject.
 
 #![allow(
     clippy::unwrap_used,

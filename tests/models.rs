@@ -1,10 +1,10 @@
-//! Our own models, through the library: each one draws, sanely, and the same with every structure.
+//! Our own models, rendered through the library: each one renders, has sane values, and looks the same with every structure.
 
 use crate::common::{bits, models, still};
 use meshray::accel::AccelKind;
 use meshray::load::{LoadOptions, load};
 
-/// Few pixels, as one of the structures is none; and fewer for the others that are slow.
+/// Few pixels, because one of the structures is `none`; even fewer for the other slow structures.
 const WIDTH: u32 = 24;
 const HEIGHT: u32 = 18;
 const FEWER: u32 = 3;

@@ -1,8 +1,8 @@
-//! Every model and broken file that others made, in one process: loads, renders small, stays sane, has the same
-//! bits whether points are shaded one by one or side by side, and looks as it did.
+//! Every third-party model and broken file, in one process: each loads, renders small, has sane values, has the same bits whether
+//! points are shaded one by one or side by side, and matches its stored picture.
 //!
-//! Runs only when `MESHRAY_SHARED` names the folder that holds `models/`; it says how many files it saw, what they were
-//! warned about and what was refused.
+//! Runs only when `MESHRAY_SHARED` names the folder that holds `models/`; prints the numbers of files, of warnings and of
+//! refusals.
 
 use crate::common::{bits, stills};
 use crate::golden::sheet::Sheet;
@@ -16,16 +16,16 @@ use std::time::{Duration, Instant};
 
 const SIZE: u32 = 64;
 
-/// No file may take longer than this to load and render.
+/// Longest time for a file to load and render.
 const TIME_LIMIT: Duration = Duration::from_secs(60);
 
-/// More triangles than these take the textbook structure too long.
+/// Number of triangles above which the textbook structure takes too long.
 const MANY: usize = 1 << 20;
 
-/// Part of the pixels that a picture of a framed model with faces covers at least.
+/// Least fraction of the pixels that a framed model with faces covers.
 const MIN_COVERAGE: f64 = 0.05;
 
-/// Models that cover less for a good reason.
+/// Models that cover less for a good reason, and that reason.
 const THIN: &[(&str, &str)] = &[
     ("assimp/number_formats.obj", "its corners lie on one line"),
     ("assimp/regr_3429812.obj", "a strip 8 times as long as wide, seen askew"),
@@ -34,15 +34,15 @@ const THIN: &[(&str, &str)] = &[
     ("tinyobjloader/leading-zero-in-exponent-notation-issue-210.obj", "a triangle 70 times as long as wide"),
 ];
 
-/// What became of one file.
+/// Outcome of one file.
 enum Outcome {
-    /// A picture and the warnings.
+    /// A picture, with the warnings.
     Drawn { picture: Box<Picture>, warnings: Vec<String>, faces: u64 },
-    /// It holds nothing to draw, and says so.
+    /// Nothing to draw, and reported as such.
     Empty,
     /// Refused with this message.
     Refused(String),
-    /// A panic, a value that is not a number, no answer in time: always a fault of ours.
+    /// A panic, a NaN or infinite value, or no answer in time: always our own fault.
     Broken(String),
 }
 
@@ -91,7 +91,7 @@ fn shared_models_are_drawn() {
     assert!(failures.is_empty(), "{} models fail:\n{}", failures.len(), failures.join("\n"));
 }
 
-/// Models that are there compressed as well.
+/// Models that exist in compressed form as well.
 const PAIRS: &[(&str, &str)] = &[
     ("Box/glTF/Box.gltf", "Box/glTF-Draco/Box.gltf"),
     ("CesiumMan/glTF-Binary/CesiumMan.glb", "CesiumMan/glTF-Draco/CesiumMan.gltf"),
@@ -120,7 +120,7 @@ fn shared_compressed_models_are_those_that_were_compressed() {
     }
 }
 
-/// The smallest and largest coordinate on each axis.
+/// Least and greatest coordinate on each axis.
 fn bounds(loaded: &Loaded) -> [(f64, f64); 3] {
     let mut bounds = [(f64::INFINITY, f64::NEG_INFINITY); 3];
     for instance in &loaded.scene.instances {
@@ -181,13 +181,13 @@ fn find(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Loads and renders one file on a thread of its own, so that a hang is an answer too.
+/// Loads and renders one file on a thread of its own, so that a hang is an outcome, too.
 fn try_file(path: &Path) -> Outcome {
     let (sender, receiver) = mpsc::channel();
     let file = path.to_owned();
     std::thread::spawn(move || {
         let outcome = catch_unwind(AssertUnwindSafe(|| draw(&file)));
-        // Nobody listens any more when the time limit has passed.
+        // Once the time limit has passed, the receiver is gone.
         let _ = sender.send(outcome.unwrap_or_else(|_| Outcome::Broken("panic".into())));
     });
     receiver.recv_timeout(TIME_LIMIT).unwrap_or_else(|_| Outcome::Broken(format!("no answer in {TIME_LIMIT:?}")))
@@ -218,13 +218,13 @@ fn draw(path: &Path) -> Outcome {
     Outcome::Drawn { picture: Box::new(picture), warnings, faces: loaded.facts.faces }
 }
 
-/// Part of the pixels where a surface is seen, however transparent it is.
+/// Fraction of the pixels that show a surface, however transparent.
 fn coverage(picture: &Picture) -> f64 {
     let seen = picture.layers.iter().flat_map(|layers| &layers.prim).filter(|&&prim| prim != u32::MAX).count();
     seen as f64 / picture.beauty.len() as f64
 }
 
-/// Checks that every index in a scene leads somewhere, and that numbers are numbers.
+/// Checks that every index of a scene is in range, and that numbers are not NaN.
 fn check(loaded: &Loaded) -> Result<(), String> {
     let scene = &loaded.scene;
     scene.check().map_err(|fault| fault.to_string())?;

@@ -1,14 +1,14 @@
-//! The Khronos validator's own test files against the table of codes: what is refused, warned about, accepted.
+//! The Khronos validator's own test files against the table of codes: refused, warned about, or accepted.
 //!
-//! Runs only when `MESHRAY_SHARED` names the folder that holds `models/`. The table is a promise by rule; nothing in
-//! the loader knows of these files.
+//! Runs only when `MESHRAY_SHARED` names the folder that holds `models/`. The table promises behaviour by rule; nothing in the
+//! loader knows of these files.
 
 use meshray::load::gltf::codes::{TABLE, Verdict};
 use meshray::load::{LoadError, LoadOptions, load};
 use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};
 
-/// Files that end otherwise than their codes say, and why.
+/// Files whose outcome differs from that of their codes, and why.
 const EXCEPTIONS: &[(&str, Verdict, &str)] = &[
     ("base/data/json/bom.gltf", Verdict::Warn, "a byte-order mark is no reason to refuse"),
     ("base/data/glb/bom.glb", Verdict::Warn, "a byte-order mark is no reason to refuse"),
@@ -63,7 +63,7 @@ fn find_reports(folder: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// The codes of a report and the places they are about, as our messages write them.
+/// Codes of a report, with their places in the form of our messages.
 fn codes(report: &Path) -> Vec<(String, String)> {
     let text = std::fs::read_to_string(report).unwrap();
     let report: serde_json::Value = serde_json::from_str(&text).unwrap();
@@ -73,10 +73,10 @@ fn codes(report: &Path) -> Vec<(String, String)> {
     messages.iter().map(code).collect()
 }
 
-/// What we tell of our own accord, of files that break no rule.
+/// Warnings of ours about files that break no rule.
 const OWN: &[&str] = &["face-degenerate", "gltf-buffer-nowhere", "gltf-extensions-ignored", "points-and-lines"];
 
-/// The gravest verdict over a report's codes.
+/// The most severe verdict among the codes of a report.
 fn expected(report: &Path) -> Verdict {
     let verdicts = codes(report).into_iter().map(|(code, pointer)| {
         let row = TABLE.iter().find(|row| row.khronos == code);
@@ -88,7 +88,7 @@ fn expected(report: &Path) -> Verdict {
     verdicts.min_by_key(|&verdict| verdict as usize).unwrap_or(Verdict::Accept)
 }
 
-/// What became of a file; `None`: a panic, or a refusal without a word.
+/// Outcome for a file, with its message; `None`: a panic, or a refusal without a message.
 fn outcome(model: &Path) -> (Option<Verdict>, String) {
     match catch_unwind(|| load(model, &LoadOptions::default())) {
         Err(_) => (None, "panic".into()),

@@ -1,8 +1,8 @@
-//! How many instructions the kernels and whole pictures take: `cargo bench --bench instructions -- [--record]`.
+//! Instruction counts of the kernels and of whole pictures: `cargo bench --bench instructions -- [--record]`.
 //!
-//! Valgrind's Callgrind counts them, so that the figures depend on neither the machine's speed nor its load. It knows no
-//! AVX-512: those kernels are the same code as AVX2's. What is counted must not exceed `baseline.txt` beside this file by
-//! more than [`ALLOWED`]; `--record` writes that file anew.
+//! Valgrind's Callgrind counts them, so that the figures depend neither on the machine's speed nor on its load. It does not
+//! support AVX-512: those kernels are the same code as AVX2's. Counts must not exceed those of `baseline.txt` beside this file by
+//! more than [`ALLOWED`]; `--record` rewrites that file.
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command that prints what it counted")]
 
@@ -26,16 +26,16 @@ use meshray::scene::{
     Reflection, Sampler, Scene, Sheen, Texture, TextureRef, UvTransform, default_light, framing,
 };
 
-/// Part by which a count may exceed its baseline.
+/// Fraction by which a count may exceed its baseline.
 const ALLOWED: f64 = 0.03;
 
-/// The same where the baseline was recorded with another compiler, which makes other code.
+/// The same if the baseline was recorded with another compiler, which generates different code.
 const ALLOWED_OF_ANOTHER: f64 = 0.15;
 
 const TRIANGLES: usize = 20_000;
 const RAYS: usize = 4096;
 
-/// Part of the landscape that rays that run alike see: neighbours then often hit the same triangle, as in a picture.
+/// Fraction of the landscape that coherent rays cover: neighbours then often hit the same triangle, as in a picture.
 const NARROW: f32 = 0.125;
 
 const LEVELS: [&str; 2] = ["portable", "AVX2"];
@@ -44,8 +44,8 @@ const MODES: [(TraceMode, &str); 3] =
 const RUNS: [&str; 2] = ["alike", "apart"];
 const QUESTIONS: [&str; 2] = ["first", "any"];
 
-/// Pictures by what they show and what lights it: a sample for each of [`RAYS`] pixels. They are drawn with the best
-/// instructions that Valgrind knows, so that a formula that is no longer computed in lanes shows.
+/// Pictures by surface and light: one sample for each of [`RAYS`] pixels. They are rendered with the best instructions that
+/// Valgrind supports, so that a formula that is no longer vectorised shows.
 const PICTURES: [[&str; 2]; 10] = [
     ["plain", "lamp"],
     ["plain", "ball"],
@@ -66,11 +66,11 @@ const PANORAMA_ROWS: u32 = 64;
 /// Bounces in glass.
 const BOUNCES: u32 = 3;
 
-/// One figure: level, way, how the rays run, and what is asked; or level, "picture", of what, and what lights it.
+/// One case: level, trace mode, coherence of the rays, and kind of query; or level, "picture", surface, and light.
 type Case = [String; 4];
 
 fn main() -> ExitCode {
-    // Cargo adds --bench to what was typed.
+    // Cargo adds --bench to the arguments.
     let words: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words[..] {
@@ -85,7 +85,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Counts every case and holds it against the baseline, or records it.
+/// Counts every case and compares it with the baseline, or records it.
 fn compare(record: bool) -> ExitCode {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/instructions/baseline.txt");
     let baseline = match std::fs::read_to_string(&file) {
@@ -194,7 +194,7 @@ fn count(case: &Case) -> Result<u64, String> {
     count.filter(|&n| out.status.success() && n > 0).ok_or_else(|| format!("valgrind counted nothing:\n{text}"))
 }
 
-/// Traces the rays of one case, most of it in [`counted`].
+/// Traces the rays of one case; most of the work is in [`counted`].
 fn trace([level, way, run, question]: [&str; 4]) -> ExitCode {
     let world = World::new(&Family::Mountain.scene(TRIANGLES));
     let (vertices, triangles) = (world.shapes.vertices, world.shapes.triangles);
@@ -213,8 +213,8 @@ fn trace([level, way, run, question]: [&str; 4]) -> ExitCode {
     if found > RAYS / 4 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Renders a landscape of one material from above, plain or with maps that make it rough, smooth and bumpy in turn; most
-/// of it in [`counted_picture`].
+/// Renders a landscape of one material from above, plain or with maps that make it rough, smooth and bumpy in turn; most of the
+/// work is in [`counted_picture`].
 fn picture(of: &str, light: &str) -> ExitCode {
     let mut scene = Family::Mountain.scene(TRIANGLES);
     scene.materials.fill(Material::plain());
@@ -257,14 +257,14 @@ fn picture(of: &str, light: &str) -> ExitCode {
     let textures = TextureStore::new(&scene);
     let view = &View::look_at(eye, middle, DVec3::Z, Lens::perspective(0.3));
     let job = Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view, settings: &settings };
-    // The pool's thread draws what it counts.
+    // The thread of the pool executes the code that is counted.
     let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(1).build() else { return ExitCode::from(2) };
     let shown = pool.install(|| counted_picture(&job));
     println!("{shown} of {RAYS} pixels show the landscape");
     if shown > RAYS / 2 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Surroundings of noise.
+/// A panorama of noise.
 fn panorama() -> Panorama {
     let mut random = Random::new(5);
     let (width, height) = (2 * PANORAMA_ROWS, PANORAMA_ROWS);
@@ -272,7 +272,7 @@ fn panorama() -> Panorama {
     Panorama { name: String::new(), width, height, texels: Arc::new(texels), ..Panorama::default() }
 }
 
-/// Gives all meshes normals, tangents and coordinates, and all materials maps of noise.
+/// Gives all meshes normals, tangents and texture coordinates, and all materials maps of noise.
 fn paint(scene: &mut Scene) {
     let (lo, hi) = World::new(scene).bounds;
     let scale = (1.0 / (hi - lo).max_element()) as f32;
@@ -301,7 +301,7 @@ fn paint(scene: &mut Scene) {
     });
 }
 
-/// Cuts holes into all materials, where their map of colours is dim.
+/// Cuts holes into all materials, where their colour map is dark.
 fn punch(scene: &mut Scene) {
     if let Pixels::Rgb8(numbers) = &scene.bitmaps[0].pixels {
         scene.bitmaps[0].pixels = Pixels::Rgba8(numbers.as_chunks().0.iter().map(|&[r, g, b]| [r, g, b, r]).collect());
@@ -309,7 +309,7 @@ fn punch(scene: &mut Scene) {
     scene.materials.iter_mut().for_each(|material| material.alpha_mode = AlphaMode::Mask { cutoff: 0.4 });
 }
 
-/// Covers all materials with fibres and clear coat, and maps of both.
+/// Covers all materials with sheen and clear coat, and maps of both.
 fn cover(scene: &mut Scene) {
     for material in &mut scene.materials {
         let map = material.base_color_map;
@@ -326,7 +326,7 @@ fn cover(scene: &mut Scene) {
     }
 }
 
-/// What is counted of a picture; how many pixels show anything lit.
+/// The counted part of a picture; returns how many pixels show anything lit.
 #[inline(never)]
 fn counted_picture(job: &Job) -> usize {
     render(job, &()).picture.beauty.iter().filter(|[r, g, b, a]| *a > 0.0 && r + g + b > 0.0).count()
@@ -337,7 +337,7 @@ struct Answers {
     occluded: Vec<bool>,
 }
 
-/// What is counted: Callgrind knows it by its name.
+/// The counted part of a trace: Callgrind selects it by its name.
 #[inline(never)]
 fn counted<A: Accel>(accel: &A, rays: &[Ray], any: bool, answers: &mut Answers, scratch: &mut A::Scratch) {
     if any {
@@ -347,7 +347,8 @@ fn counted<A: Accel>(accel: &A, rays: &[Ray], any: bool, answers: &mut Answers, 
     }
 }
 
-/// Rays down on the landscape, from one point through a grid in blocks of 4×4, or from anywhere to anywhere.
+/// Rays at the landscape: down from one point through a grid in blocks of 4×4 if `alike`, otherwise with random origins and
+/// targets.
 fn rays(shapes: &Shapes, alike: bool) -> Vec<Ray> {
     let bounds = shapes.vertices.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |b, &v| (b.0.min(v), b.1.max(v)));
     let (middle, size) = ((bounds.0 + bounds.1) * 0.5, bounds.1 - bounds.0);

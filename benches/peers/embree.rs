@@ -1,6 +1,6 @@
 //! Embree, from a library that is named at run time.
 //!
-//! Only what is asked here is declared, after the public documentation of its versions 3.13 and 4.
+//! Only the functions used here are declared, after the public documentation of versions 3.13 and 4.
 
 #![expect(unsafe_code, reason = "calls of a C library; every call is given what its documentation asks for")]
 
@@ -33,14 +33,14 @@ const COHERENT: c_int = 1 << 16;
 const COHERENT_3: c_int = 1;
 const ONLY_TRIANGLES: c_int = 1 << 1;
 
-/// Widths of packets that a device may trace as such, and the properties that tell.
+/// Packet widths that a device may support natively, and the properties to query for that.
 const WIDTHS: [(usize, c_int); 3] = [(16, 34), (8, 33), (4, 32)];
 
-/// Which lanes of a packet hold a ray: −1 where one does. The library wants it aligned.
+/// Mask of the lanes that hold a ray: −1 for each that does. The library requires the alignment.
 #[repr(C, align(64))]
 struct Valid<const N: usize>([c_int; N]);
 
-/// `RTCRayHit` and, with `N` of 4, 8, 16, `RTCRayHit4` and so on; room for what either version appends.
+/// `RTCRayHit` and, with `N` of 4, 8, 16, `RTCRayHit4` and so on; with room for the fields that either version appends.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
 struct RayHit<const N: usize> {
@@ -90,10 +90,10 @@ impl<const N: usize> RayHit<N> {
         self.prim[lane] = INVALID;
     }
 
-    /// All lanes, from those of a packet that follow `first`: origin, direction, and where they end.
+    /// Sets all lanes from those of a packet from `first` on: origin, direction, and end.
     #[inline(always)]
     fn set_all(&mut self, packet: &Packet, first: usize) {
-        // Whole rows: the library loads them as vectors, and waits for rows that were stored number by number.
+        // Whole rows: the library loads them as vectors, and would stall on rows that were stored number by number.
         let [ox, oy, oz, dx, dy, dz, end] =
             packet.each_ref().map(|row| row[first..].first_chunk().unwrap_or(&[0.0; N]));
         self.org = [*ox, *oy, *oz];
@@ -137,29 +137,29 @@ unsafe extern "C" fn monitor(_: *mut c_void, bytes: isize, _: bool) -> bool {
     true
 }
 
-/// The library, loaded. It is never unloaded: its threads outlive the last scene.
+/// The loaded library. It is never unloaded: its threads outlive the last scene.
 pub(crate) struct Embree {
     library: ManuallyDrop<Library>,
     pub version: String,
     major: isize,
     isa: &'static str,
-    /// Rays of the widest packets that it traces as such.
+    /// Width of the widest packets that the device supports natively.
     pub widest: usize,
 }
 
-/// A scene built by it.
+/// A scene built by the library.
 pub(crate) struct Built<'e> {
     embree: &'e Embree,
     scene: Scene,
     device: Device,
     robust: bool,
-    /// Rays of a packet; 1: ray by ray.
+    /// Rays in a packet; 1: ray by ray.
     packet: usize,
-    /// Bytes of its structure.
+    /// Size of the structure, bytes.
     pub bytes: usize,
 }
 
-/// What its device is told so that it keeps to a level.
+/// Device configuration that limits the library to the instruction set of a level.
 fn isa(level: Level) -> &'static str {
     match level.word() {
         "portable" if cfg!(target_arch = "x86_64") => ",isa=sse2",
@@ -169,7 +169,7 @@ fn isa(level: Level) -> &'static str {
 }
 
 impl Embree {
-    /// Loads the library, and first the TBB that lies beside it, if there is one. It keeps to the instruction set of a level.
+    /// Loads the library, preceded by a TBB beside it, if there is one. The library is limited to the instruction set of a level.
     pub(crate) fn load(path: &Path, level: Level) -> Result<Self, String> {
         for entry in path.parent().into_iter().filter_map(|p| p.read_dir().ok()).flatten().flatten() {
             let name = entry.file_name();
@@ -183,7 +183,7 @@ impl Embree {
         let mut embree =
             Self { library: ManuallyDrop::new(library), version: String::new(), major: 0, widest: 1, isa: isa(level) };
         let device = embree.device(1);
-        // SAFETY: the signature is the documented one; 0 asks for the version, others for widths of packets.
+        // SAFETY: the signature is the documented one; property 0 is the version, others are packet widths.
         let property = |which| unsafe {
             embree.function::<unsafe extern "C" fn(Device, c_int) -> isize>("rtcGetDeviceProperty")(device, which)
         };
@@ -196,20 +196,20 @@ impl Embree {
     }
 
     fn function<T: Copy>(&self, name: &str) -> T {
-        // SAFETY: callers name the type that the documentation gives.
+        // SAFETY: callers name the type given by the documentation.
         let symbol = unsafe { self.library.get::<T>(name.as_bytes()) };
         *symbol.unwrap_or_else(|e| panic!("{name}: {e}"))
     }
 
     fn device(&self, threads: usize) -> Device {
         let config = format!("threads={threads},set_affinity=0{}\0", self.isa);
-        // SAFETY: a string that ends with 0.
+        // SAFETY: the string ends with 0.
         unsafe {
             self.function::<unsafe extern "C" fn(*const c_char) -> Device>("rtcNewDevice")(config.as_ptr().cast())
         }
     }
 
-    /// Builds a scene; `time` is called around the building alone.
+    /// Builds a scene; `time` is called around the build alone.
     pub(crate) fn build<T>(
         &self,
         shapes: &Shapes,
@@ -218,7 +218,7 @@ impl Embree {
         time: impl FnOnce(&mut dyn FnMut()) -> T,
     ) -> (Built<'_>, T) {
         let device = self.device(threads);
-        // SAFETY: documented signatures and enumerators; the buffers have the sizes that are asked for.
+        // SAFETY: documented signatures and enumerators; the buffers have the requested sizes.
         unsafe {
             self.function::<unsafe extern "C" fn(Device, Monitor, *mut c_void)>("rtcSetDeviceMemoryMonitorFunction")(
                 device,
@@ -266,13 +266,13 @@ impl Drop for Built<'_> {
 }
 
 impl Built<'_> {
-    /// Asks with packets of 4, 8 or 16, or with 1 ray by ray.
+    /// Makes queries use packets of 4, 8 or 16 rays, or trace ray by ray with 1.
     pub(crate) fn with_packets(&mut self, rays: usize) -> &mut Self {
         self.packet = rays;
         self
     }
 
-    /// Asks all rays.
+    /// Traces all rays.
     fn ask(&self, any: bool, coherent: bool, rays: Rays, answers: &mut [Answer]) {
         let mut arguments = Arguments {
             flags: if coherent { COHERENT } else { 0 },
@@ -296,7 +296,7 @@ impl Built<'_> {
         }
     }
 
-    /// `N` divides [`PACKET`].
+    /// Traces packets; `N` divides [`PACKET`].
     fn ask_packets<const N: usize>(
         &self,
         any: bool,
@@ -354,7 +354,7 @@ impl Built<'_> {
     }
 }
 
-/// What a query is called.
+/// Name of a query in the library's functions.
 fn verb(any: bool) -> &'static str {
     if any { "Occluded" } else { "Intersect" }
 }

@@ -1,7 +1,7 @@
 //! The same rays through other programs: `cargo bench --bench peers -- [options]`.
 //!
-//! One process, one thread: each pass sends all rays of a kind through every program in turn, and the processor time of
-//! the passes is compared by its median. Embree is loaded from the path in `MESHRAY_EMBREE`, if there is one.
+//! One process, one thread: each pass sends all rays of a kind through every program in turn; the median processor time of the
+//! passes is compared. Embree is loaded from the path in `MESHRAY_EMBREE`, if that is set.
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command that prints what it measured")]
 
@@ -50,7 +50,7 @@ const KERNELS: [(TraceMode, &str); 4] = [
 
 const MESHES: [&str; 5] = ["rocker", "bunny", "stadium", "hall", "mountain"];
 
-/// What was typed.
+/// Parsed command line.
 struct Words {
     passes: usize,
     kinds: String,
@@ -128,7 +128,7 @@ fn parse(mut words: impl Iterator<Item = String>) -> Option<Words> {
     Some(parsed)
 }
 
-/// All programs on one mesh; whether all verdicts of ours are those of the robust reference.
+/// Compares all programs on one mesh; returns whether all verdicts of ours equal those of the robust reference.
 fn compare(mesh: &Mesh, embree: Option<&Embree>, words: &Words) -> bool {
     let shapes = &mesh.shapes;
     let rays = {
@@ -192,10 +192,10 @@ fn compare(mesh: &Mesh, embree: Option<&Embree>, words: &Words) -> bool {
     clean
 }
 
-/// Builds a structure with so many threads: the seconds that took, and its bytes.
+/// Builds a structure with the given number of threads; returns seconds and bytes.
 type Build<'a> = Box<dyn Fn(usize) -> (f64, usize) + 'a>;
 
-/// How long structures take to build, and what they weigh. The programs take turns.
+/// Prints the build times and sizes of structures. The programs take turns.
 fn builds(mesh: &Mesh, embree: Option<&Embree>, passes: usize) {
     let (shapes, triangles) = (&mesh.shapes, mesh.shapes.triangles.len() as f64);
     let mut programs: Vec<(&str, Build)> = Vec::new();
@@ -238,7 +238,7 @@ fn builds(mesh: &Mesh, embree: Option<&Embree>, passes: usize) {
     }
 }
 
-/// Builds one of ours with so many threads, which are there and awake, as they are once a file has been read.
+/// Builds a structure of ours with `threads` threads, which are already awake, as they are after a file has been read.
 fn ours<T: Send>(threads: usize, build: impl Fn() -> T + Sync, bytes: impl Fn(&T) -> u64) -> (f64, usize) {
     let Ok(pool) = meshray::threads::pool(threads) else { return (f64::NAN, 0) };
     pool.broadcast(|_| ());
@@ -248,7 +248,7 @@ fn ours<T: Send>(threads: usize, build: impl Fn() -> T + Sync, bytes: impl Fn(&T
     (seconds, bytes(&built) as usize)
 }
 
-/// Rays a second, in millions, of each program.
+/// Rays per second, in millions, of each program.
 fn measure(tracers: &[Box<dyn Tracer + '_>], kind: Kind, rays: Rays, passes: usize) -> Vec<f64> {
     let mut answers = vec![Answer { prim: NO_PRIM, t: 0.0 }; SLICE];
     let mut spreads = vec![Spread::default(); tracers.len()];
@@ -271,7 +271,7 @@ fn measure(tracers: &[Box<dyn Tracer + '_>], kind: Kind, rays: Rays, passes: usi
     spreads.iter().map(|s| rays.all.len() as f64 / s.median() * 1e-6).collect()
 }
 
-/// How many rays each program calls a hit that the reference calls a miss, or the other way round.
+/// Number of rays for which each program reports a hit and the reference a miss, or vice versa.
 fn verdicts(tracers: &[Box<dyn Tracer + '_>], reference: &dyn Tracer, kind: Kind, rays: Rays) -> Vec<usize> {
     let ask = |tracer: &dyn Tracer| {
         let mut answers = vec![Answer { prim: NO_PRIM, t: 0.0 }; rays.all.len()];

@@ -1,4 +1,4 @@
-//! Meshes and the cameras that look at them.
+//! Meshes and their cameras.
 
 use std::path::Path;
 
@@ -14,19 +14,19 @@ pub(crate) struct Mesh {
     pub camera: Camera,
 }
 
-/// Where the rays come from.
+/// A camera, and the light of its shadow rays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Camera {
     pub eye: DVec3,
     pub target: DVec3,
     pub up: DVec3,
-    /// Vertical, degrees.
+    /// Vertical field of view, degrees.
     pub fov: f64,
     pub light: DVec3,
 }
 
 impl Mesh {
-    /// The mesh `name` of `folder`, in the file's own coordinates; its camera is the row of that name in a table.
+    /// Reads the mesh `name` from `folder`, in the file's own coordinates; its camera is the row of that name in a table.
     pub(crate) fn read(folder: &Path, name: &str, cameras: &str) -> Result<Self, String> {
         let file = folder.join(format!("{name}.obj"));
         let failed = |what: &dyn std::fmt::Display| format!("{}: {what}", file.display());
@@ -42,7 +42,7 @@ impl Mesh {
         Ok(Self { name: name.into(), shapes: shapes(vertices, triangles), camera })
     }
 
-    /// A made landscape of about so many triangles, seen from above one of its corners.
+    /// A generated landscape of about `triangles` triangles, seen from above one of its corners.
     pub(crate) fn mountain(triangles: usize) -> Self {
         let world = World::new(&Family::Mountain.scene(triangles));
         let (lo, hi) = (world.bounds.0 - world.center, world.bounds.1 - world.center);
@@ -63,7 +63,7 @@ fn shapes(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Shapes {
 }
 
 impl Camera {
-    /// The row of a table that starts with this name: eye, target, up, angle, light.
+    /// Finds the row of a table that starts with this name: eye, target, up, angle, light.
     fn find(table: &str, name: &str) -> Option<Self> {
         let row = table.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(','))?;
         let numbers: Vec<f64> =

@@ -1,4 +1,4 @@
-//! The BVHs of the crate obvhs, asked ray by ray.
+//! The BVHs of the crate obvhs, traced ray by ray.
 
 use meshray::accel::{NO_PRIM, Shapes};
 use obvhs::BvhBuildParams;
@@ -9,7 +9,7 @@ use obvhs::triangle::Triangle;
 
 use crate::tracer::{Answer, Rays, Tracer};
 
-/// Its compressed eight-wide hierarchy; triangles in the order of its leaves.
+/// The crate's compressed eight-wide hierarchy; triangles in the order of its leaves.
 pub(crate) struct Compressed {
     bvh: CwBvh,
     triangles: Vec<Triangle>,

@@ -1,4 +1,4 @@
-//! Our own structures, by the kernel that answers.
+//! Our own structures, one tracer for each kernel.
 
 use std::cell::RefCell;
 
@@ -6,7 +6,7 @@ use meshray::accel::{Accel, Hit, HitQueries, NO_PRIM, NoProbe, Ray, Shapes, Spli
 
 use crate::tracer::{Answer, Rays, Tracer};
 
-/// The name of a structure.
+/// Printed name of a structure.
 pub(crate) fn structure(splitting: Splitting) -> &'static str {
     match splitting {
         Splitting::Octree => "meshray fast-octree",
@@ -16,7 +16,7 @@ pub(crate) fn structure(splitting: Splitting) -> &'static str {
 
 type Buffers<'a> = (<Wide<'a> as Accel>::Scratch, Vec<Hit>, Vec<bool>);
 
-/// One structure and one kernel.
+/// One structure with one kernel.
 pub(crate) struct Ours<'a> {
     wide: Wide<'a>,
     name: String,
@@ -30,7 +30,7 @@ impl<'a> Ours<'a> {
         Self { wide, name: format!("{structure}, {kernel}"), buffers }
     }
 
-    /// The first hits of all rays.
+    /// Returns the first hits of all rays.
     pub(crate) fn hits(shapes: &Shapes, rays: &[Ray]) -> Vec<Hit> {
         let wide = Wide::build(shapes, Splitting::SurfaceArea);
         let mut hits = vec![Hit::MISS; rays.len()];

@@ -1,6 +1,6 @@
-//! The rays that are replayed: from the eye, off the surface, to the light.
+//! Generated rays: from the eye, off the surface, to the light.
 //!
-//! In double precision, rounded to `f32` once. All come in the order of blocks of 4×4 pixels, sixteen rays each.
+//! Computed in double precision, and rounded to `f32` once. All are in the order of blocks of 4×4 pixels, sixteen rays each.
 
 use std::f64::consts::PI;
 
@@ -15,12 +15,12 @@ const HEIGHT: u32 = 768;
 /// Columns and rows of a block.
 const BLOCK: u32 = 4;
 
-/// One kind of rays.
+/// Kinds of rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// From the eye through every pixel: the first hit.
+    /// From the eye through every pixel: first hit.
     Primary,
-    /// One from each hit of those, spread by the cosine: the first hit.
+    /// One from each hit of those, cosine-weighted around the normal: first hit.
     Diffuse,
     /// One from each hit to the light: any hit.
     Shadow,
@@ -29,7 +29,7 @@ pub(crate) enum Kind {
 impl Kind {
     pub(crate) const ALL: [Self; 3] = [Self::Primary, Self::Diffuse, Self::Shadow];
 
-    /// As it is typed and printed.
+    /// Letter as typed and printed.
     pub(crate) fn letter(self) -> char {
         match self {
             Self::Primary => 'P',
@@ -45,7 +45,7 @@ fn ray(origin: DVec3, dir: DVec3, t_max: f64) -> Ray {
     Ray { origin: origin.as_vec3(), t_min: 0.0, dir: dir.as_vec3(), t_max, exclude: NO_PRIM, sample: 0 }
 }
 
-/// Through every pixel.
+/// Rays from the eye through every pixel.
 pub(crate) fn primary(camera: &Camera) -> Vec<Ray> {
     let tan = (camera.fov * PI / 360.0).tan();
     let (width, height) = (f64::from(WIDTH), f64::from(HEIGHT));
@@ -62,7 +62,7 @@ pub(crate) fn primary(camera: &Camera) -> Vec<Ray> {
     pixels.map(|(x, y)| through(x, y)).collect()
 }
 
-/// What follows from the first hits: the diffuse rays and the shadow rays.
+/// Secondary rays of the first hits: the diffuse rays and the shadow rays.
 pub(crate) fn secondary(shapes: &Shapes, camera: &Camera, primary: &[Ray], hits: &[Hit]) -> [Vec<Ray>; 2] {
     let (mut diffuse, mut shadow) = (Vec::new(), Vec::new());
     for (i, (ray, hit)) in (0..).zip(primary.iter().zip(hits)).filter(|(_, (_, hit))| hit.is_some()) {
@@ -75,7 +75,7 @@ pub(crate) fn secondary(shapes: &Shapes, camera: &Camera, primary: &[Ray], hits:
     [diffuse, shadow]
 }
 
-/// A point just before the surface, and its normal towards the ray.
+/// A point just off the surface, and the normal on the side of the ray.
 fn leaving(shapes: &Shapes, ray: &Ray, hit: &Hit) -> (DVec3, DVec3) {
     let [a, b, c] = shapes.triangle(hit.prim).map(Vec3::as_dvec3);
     let (e1, e2) = (b - a, c - a);
@@ -87,7 +87,7 @@ fn leaving(shapes: &Shapes, ray: &Ray, hit: &Hit) -> (DVec3, DVec3) {
     (origin + t * dir + 1e-4 * t * normal, normal)
 }
 
-/// The `i`th direction about a normal, spread by the cosine.
+/// The `i`th direction around a normal, cosine-weighted.
 ///
 /// Axes after T. Duff et al., *Building an Orthonormal Basis, Revisited*, 2017.
 fn bounce(n: DVec3, i: u64) -> DVec3 {

@@ -1,39 +1,39 @@
-//! What every program that is compared can do.
+//! The interface of all programs that are compared.
 
 use meshray::accel::{Pencil, Ray};
 
-/// What a ray met: the prim, or `NO_PRIM`; for rays that ask for any hit, 0 or `NO_PRIM`.
+/// Answer to a ray: the prim hit, or `NO_PRIM`; for any-hit queries 0 or `NO_PRIM`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Answer {
     pub prim: u32,
     pub t: f32,
 }
 
-/// A built structure of some program.
+/// A built structure of one program.
 pub(crate) trait Tracer {
-    /// As printed.
+    /// Name as printed.
     fn name(&self) -> String;
 
-    /// Asks for the first hits, or for any; `coherent` is what those who know may tell.
+    /// Finds first hits, or any hits; `coherent` is a hint for programs that accept one.
     fn trace(&self, any: bool, coherent: bool, rays: Rays, answers: &mut [Answer]);
 }
 
-/// Rays of a packet.
+/// Rays in a packet.
 pub(crate) const PACKET: usize = 16;
 
 /// Sixteen rays side by side: origins, directions, ends.
 pub(crate) type Packet = [[f32; PACKET]; 7];
 
-/// The same rays one after another, in packets, and by axis, so that each program finds them as it likes them.
+/// The same rays one after another, in packets, and by axis, so that each program gets the layout that suits it.
 #[derive(Clone, Copy)]
 pub(crate) struct Rays<'a> {
     pub all: &'a [Ray],
     pub packets: &'a [Packet],
-    /// The directions by axis, where all start at one place.
+    /// Directions by axis, if all rays have the same origin.
     pub pencil: Option<Pencil<'a>>,
 }
 
-/// Rays in packets; the last one may be filled up with what it has.
+/// Groups rays into packets; the last one is padded with copies of its last ray.
 pub(crate) fn packets(rays: &[Ray]) -> Vec<Packet> {
     let packet = |rays: &[Ray]| {
         let mut packet = [[0.0; PACKET]; 7];
@@ -49,7 +49,7 @@ pub(crate) fn packets(rays: &[Ray]) -> Vec<Packet> {
     rays.chunks(PACKET).map(packet).collect()
 }
 
-/// The directions of rays, by axis.
+/// Directions of rays, by axis.
 pub(crate) fn directions(rays: &[Ray]) -> [Vec<f32>; 3] {
     [0, 1, 2].map(|k| rays.iter().map(|ray| ray.dir[k]).collect())
 }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 /// Rays of one aim in one task.
 const SLICE: usize = 1024;
 
-/// One task in so many also asks whether anything is in the way, and what comes next.
+/// One task in this many also makes occlusion queries and next-hit queries.
 const OTHER_QUERIES: usize = 8;
 
 #[derive(Clone, Copy, Default)]
@@ -39,7 +39,7 @@ impl Add for Count {
     }
 }
 
-/// Compares over all models with triangles; each gets the same share of rays and of tests.
+/// Compares hits over all models with triangles; each gets the same share of rays and of tests.
 pub(crate) fn run(files: &[String], rays: f64, tests: f64) -> bool {
     println!(
         "{rays:e} rays through fast-octree and fast-bvh, {tests:e} tests by brute force, spread over {} files",
@@ -89,11 +89,11 @@ fn model(shapes: &Shapes, rays: f64, tests: f64) -> Count {
     let brute = Listed::new(shapes);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates")]
     let tasks = (rays / (SLICE * Aim::ALL.len()) as f64).ceil() as usize;
-    // As many rays of each task go to brute force as the tests allow.
+    // Each task sends as many rays to brute force as the tests allow.
     let per_task = tests / shapes.bounded().max(1) as f64 / tasks as f64;
     let task = |number: usize| {
         let mut aimer = aimer.reseeded(number as u64 ^ 0x5851_f42d_4c95_7f2d);
-        // The fraction of a ray that is left over goes to some of the tasks.
+        // The fractional rays that remain are distributed over the tasks.
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates")]
         let brute_rays = ((number + 1) as f64 * per_task) as usize - (number as f64 * per_task) as usize;
         let rays: Vec<Ray> = Aim::ALL.iter().flat_map(|&aim| aimer.rays(aim, SLICE)).collect();

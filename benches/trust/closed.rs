@@ -1,4 +1,4 @@
-//! Rays from inside a closed mesh, aimed where tests fail: none may get out.
+//! Rays from inside a closed mesh, aimed where tests tend to fail: none may escape.
 
 use meshray::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, NO_PRIM, NoProbe, Ray, Shapes};
 use meshray::bench::star::star;
@@ -11,16 +11,16 @@ use rayon::prelude::*;
 /// Rays of one task.
 const SLICE: u32 = 4096;
 
-/// Rays that structures which test very much are given: one in so many of the others', but a few at least.
+/// Slow structures get one in this many of the others' rays, but at least a few.
 const ONE_IN: u32 = 3200;
 const FEW: u32 = 400;
 
 const AIMS: [&str; 4] = ["corners", "edge middles", "edges", "random"];
 
-/// Direction of the moves.
+/// Direction in which the mesh is moved.
 const AWAY: DVec3 = DVec3::new(1.0, 0.7, 1.3);
 
-/// Prints the escapes of `rays` rays for each place of the mesh, and tells whether there were none.
+/// Prints the escapes of `rays` rays for each place of the mesh; returns whether there were none.
 pub(crate) fn run(rays: f64) -> bool {
     let mesh = star(400, 200);
     println!("closed mesh, {} triangles, {rays:e} rays a place; rays that escape, by aim", mesh.triangles.len());
@@ -72,7 +72,7 @@ fn escapes(accel: &AnyAccel, shapes: &Shapes, center: Vec3, aim: usize, count: u
 fn ray(shapes: &Shapes, center: Vec3, aim: usize, random: &mut Random) -> Ray {
     let origin = loop {
         let p = random.cube();
-        // The mesh has no point within the unit sphere but its faces may bend inwards a little.
+        // The mesh has no vertex within the unit sphere, but its faces may bend inwards a little.
         if p.length_squared() < 0.8 {
             break center + p;
         }

@@ -1,4 +1,4 @@
-//! Speed against error: our ray/triangle tests and, where its library is named, Embree's, on rays that are hard.
+//! Speed against error: our ray/triangle tests and, where its library is named, Embree's, on difficult rays.
 
 use std::fs;
 use std::path::Path;
@@ -17,13 +17,13 @@ use rayon::prelude::*;
 use crate::embree::Embree;
 use crate::tracer::{Answer, Rays, Tracer, packets};
 
-/// Times each is measured.
+/// Number of timed passes of each candidate.
 const PASSES: usize = 5;
 
-/// One way to find the hits of all rays.
+/// A candidate for finding the hits of all rays.
 type Candidate<'a> = (String, bool, Box<dyn FnMut(&mut Vec<Hit>) + 'a>);
 
-/// Judges on one model, `count` rays of each aim, and writes a page.
+/// Judges the candidates on one model, with `count` rays of each aim, and writes an HTML page.
 pub(crate) fn run(file: &str, count: usize, page: &str) -> bool {
     let scene = match load(file.as_ref(), &LoadOptions::default()) {
         Ok(loaded) => loaded.scene,

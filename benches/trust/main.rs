@@ -1,8 +1,8 @@
-//! Hits over very many rays: `cargo bench --bench trust -- closed|agree|kernels [options]`.
+//! Correctness of hits over very many rays: `cargo bench --bench trust -- closed|agree|kernels [options]`.
 //!
-//! `closed` counts the rays that escape from inside a closed mesh; `agree` compares the fast structures with each other
-//! and with brute force on the models that are named. Both end with 1 if there is any difference. `kernels` draws the speed of
-//! our tests, and of Embree's where `MESHRAY_EMBREE` names its library, against their wrong answers.
+//! `closed` counts the rays that escape from inside a closed mesh; `agree` compares the fast structures with each other and with
+//! brute force on the given models. Both exit with 1 if there is any difference. `kernels` plots the speed of our tests, and of
+//! Embree's where `MESHRAY_EMBREE` names its library, against their wrong answers.
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command that prints what it counted")]
 
@@ -23,7 +23,7 @@ usage: trust closed [--rays N]                       N aimed rays a place (defau
        trust agree [--rays N] [--tests N] FILE...    N rays (default 1e7), N tests of brute force (default 1e10)
        trust kernels [--rays N] FILE PAGE.html       N rays of each kind (default 1e5)";
 
-/// What was typed.
+/// Parsed command line.
 struct Words {
     rays: f64,
     tests: f64,
@@ -31,7 +31,7 @@ struct Words {
 }
 
 fn main() -> ExitCode {
-    // Cargo adds --bench to what was typed.
+    // Cargo adds --bench to the arguments.
     let mut words = std::env::args().skip(1).filter(|w| w != "--bench");
     let command = words.next();
     let clean = match (command.as_deref(), parse(words)) {
@@ -44,7 +44,7 @@ fn main() -> ExitCode {
             let rays = if w.rays > 0.0 { w.rays as usize } else { 100_000 };
             kernels::run(&w.files[0], rays, &w.files[1])
         }
-        // `cargo bench` runs every bench without words.
+        // `cargo bench` runs every bench without arguments.
         (None, _) => closed::run(1e5),
         _ => {
             eprintln!("{USAGE}");

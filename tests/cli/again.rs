@@ -1,4 +1,4 @@
-//! A picture carries what repeats it.
+//! A picture's metadata suffice to repeat it.
 
 use super::program::{CUBE, Folder, picture, textured_cube};
 
@@ -7,7 +7,7 @@ fn a_picture_is_repeated_byte_for_byte() {
     for (extension, display) in [("png", &["--exposure", "0.5", "--tone-map", "aces"][..]), ("exr", &[])] {
         let folder = Folder::with_cube();
         let (first, second) = (format!("first.{extension}"), format!("second.{extension}"));
-        // Those of the structure show in nothing but the metadata.
+        // Settings of the structure show in nothing but the metadata.
         let settings = "--view iso --seed 7 --background #204060 --accel grid-octree \
                         --grid-density 0.5 --grid-resolution 9 --max-depth 3 --leaf-size 4 --grid-cells 4x5x6 \
                         --max-references 20 --assign box --mailbox hashed";

@@ -1,10 +1,10 @@
-//! Animations on the command line: a moment, frames that share a camera, a turn around the model.
+//! Animations on the command line: single moments, frames that share a camera, turntables.
 
 use super::program::{Folder, Run, picture};
 use base64::Engine as _;
 use serde_json::Value;
 
-/// A triangle that goes right by four times its width in a second: `Slide`; and one that does nothing: `Stay`.
+/// A triangle that moves right by four times its width in a second, `Slide`, and an animation without effect, `Stay`.
 fn sliding() -> String {
     let corners = [-1.0f32, -1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 1.0, 0.0];
     let keys = [0.0f32, 1.0, 0.0, 0.0, 0.0, 8.0, 0.0, 0.0];
@@ -38,7 +38,7 @@ fn wide(folder: &Folder, arguments: &[&str]) -> Run {
     folder.render(&[arguments, &WIDE].concat())
 }
 
-/// The mean column of what is brighter than the backdrop.
+/// Mean column of the pixels brighter than the backdrop.
 fn middle(folder: &Folder, name: &str) -> f64 {
     let beauty = picture(&folder.path(name)).beauty;
     let columns = beauty.iter().enumerate().filter(|(_, p)| p[0] > 0.25).map(|(i, _)| (i % 32) as f64);
@@ -122,7 +122,7 @@ fn frames_share_a_camera_that_sees_them_all() {
     assert!(folder.names().starts_with(&names) && !folder.has("a.0005.png"), "{:?}", folder.names());
     let places: Vec<f64> = names.iter().map(|name| middle(&folder, name)).collect();
     assert!(places.windows(2).all(|pair| pair[1] > pair[0] + 3.0), "{places:?}");
-    // Framed together, the way is in the middle of the picture.
+    // The shared camera centres the whole movement.
     assert!((places[0] + places[4] - 31.0).abs() < 1.5, "{places:?}");
 }
 
@@ -180,7 +180,7 @@ fn of_several_models_each_that_has_the_animation_shows_it_and_the_others_rest() 
         serde_json::from_str::<Value>(run.text()).unwrap()["bounds"]["hi"][0].as_f64().unwrap()
     };
     assert_eq!(shown(&["both.toml"]), 1.0);
-    // Both have a Stay; of Run and of 2, which is Run, only the second.
+    // Both models have a `Stay`; only the second has `Run`, which is animation 2.
     for (name, right) in [("Stay", 1.0), ("Run", 9.0), ("2", 9.0), ("Slide", 9.0), ("0", 9.0)] {
         assert_eq!(shown(&["both.toml", "--animation", name, "--time", "1"]), right, "{name}");
     }
@@ -191,13 +191,13 @@ fn of_several_models_each_that_has_the_animation_shows_it_and_the_others_rest() 
         serde_json::from_str::<Value>(run.text().lines().next().unwrap()).unwrap()["animation"].clone()
     };
     assert_eq!(stats(&["both.toml", "--animation", "Run", "--time", "0.5"])["number"], 2);
-    // A still model may come first.
+    // A model without animations may come first.
     let merged = ["plate.obj", "b.gltf", "--merge", "-q"];
     assert_eq!(stats(&[&merged[..], &["--frames", "0..2", "--fps", "4"]].concat())["time"], 0.0);
     assert_eq!(stats(&[&merged[..], &["--time", "0.5"]].concat())["time"], 0.5);
 }
 
-/// Two lines side by side, each in a colour of its own: at each second the other is there.
+/// Two lines side by side in different colours: one is visible at first, the other from 1 second on.
 fn flashing() -> String {
     let numbers = [0.0f32, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
     let bytes: Vec<u8> = numbers.iter().chain(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]).flat_map(|x| x.to_le_bytes()).collect();
@@ -253,7 +253,7 @@ fn lines_that_come_and_go_keep_their_colours_and_their_width() {
             .replace(r#"{"mesh":0},{}"#, r#"{"mesh":0},{"mesh":0}"#),
     );
     wide(&folder, &["a.gltf", "--frames", "0..=4", "--fps", "4", "-o", "{frame}.png"]).ends(0);
-    // The line at rest is as wide while the other goes away: the left half stays as it is.
+    // The stationary line keeps its width while the other vanishes: the left half does not change.
     let rest = |name: &str| {
         let beauty = picture(&folder.path(name)).beauty;
         (0..beauty.len()).filter(|i| i % 32 < 10).map(|i| beauty[i]).collect::<Vec<_>>()
@@ -272,7 +272,7 @@ fn a_sequence_that_shows_nothing_says_so() {
     assert!(!shown.stderr.contains("anything"), "{}", shown.stderr);
 }
 
-/// The sliding triangle, lit by a lamp that stands before it: it slides away from it and is dark from behind.
+/// The sliding triangle, lit by a lamp in front of it: it slides away from the lamp, and is dark from behind.
 fn with_lamp() -> Folder {
     let lamp = r#""nodes":[{"mesh":0},{"translation":[0,0,2],"extensions":{"KHR_lights_punctual":{"light":0}}}],
         "extensionsUsed":["KHR_lights_punctual"],
@@ -300,7 +300,7 @@ fn a_picture_is_exposed_as_its_sequence_begins_and_a_view_as_if_it_were_alone() 
 
 #[test]
 fn a_sequence_that_begins_in_the_dark_is_exposed_by_what_is_lit_first() {
-    // The triangle comes from far beyond the eye.
+    // The triangle comes from far outside the view.
     let folder = with_lamp();
     let words =
         ["a.gltf", "--frames", "0..=4", "--fps", "4", "--eye", "8,0,4", "--at", "8,0,0", "--background", "black"];
@@ -323,7 +323,7 @@ fn the_time_that_metering_takes_is_told_once() {
         let seconds = |line: &str| serde_json::from_str::<Value>(line).unwrap()["seconds"]["meter"].as_f64().unwrap();
         run.text().lines().map(seconds).collect()
     };
-    // The beginning of a sequence is metered although none of its pictures may be that.
+    // The beginning of a sequence is metered even if its picture is not among those rendered.
     for words in [&["--turntable", "2/4"][..], &["--frames", "0..4", "--fps", "4", "--frame", "3"], &[]] {
         assert!(metered(words)[0] > 0.0, "{words:?}");
     }
@@ -337,13 +337,13 @@ fn the_time_that_metering_takes_is_told_once() {
 fn frames_in_which_a_scale_of_zero_hides_everything_show_what_is_behind() {
     let hiding = sliding().replace("\"path\":\"translation\"", "\"path\":\"scale\"");
     let folder = Folder::new().file("a.gltf", hiding);
-    // Scales 0 0 0 at the start and 8 0 0 at the end: a line, which shows nothing either, but is no empty scene.
+    // Scales 0 0 0 at the start and 8 0 0 at the end: a line, which is just as invisible, but not an empty scene.
     folder.render(&["a.gltf", "--frames", "0..2", "--fps", "1", "-q", "-o", "{frame}.png"]).ends(0);
     assert!(folder.has("0.png") && folder.has("1.png"), "{:?}", folder.names());
     folder.render(&["a.gltf", "--frame", "0", "--fps", "1"]).ends(3).says(&["nothing to draw"]);
 }
 
-/// A triangle that turns from red to black within a second, in front of a textured one that is there from then on.
+/// A triangle that turns from red to black within a second, in front of a textured one that appears at the end of it.
 fn changing() -> String {
     let corners = [-4.0f32, -1.0, 0.0, 12.0, -1.0, 0.0, 4.0, 8.0, 0.0];
     let keys = [0.0f32, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0];

@@ -4,7 +4,7 @@ use super::program::{CUBE, Folder, textured_cube};
 use rawzip::{CompressionMethod, ZipArchiveWriter};
 use std::io::Write;
 
-/// A zip archive of files by name, stored as they are.
+/// A zip archive of files by name, stored uncompressed.
 fn zip(files: &[(&str, &[u8])]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut archive = ZipArchiveWriter::new(&mut bytes);
@@ -19,7 +19,7 @@ fn zip(files: &[(&str, &[u8])]) -> Vec<u8> {
     bytes
 }
 
-/// A textured cube in an archive, called as every model of a well-known site is, and two models in another.
+/// A textured cube in an archive, in the folder that a well-known site gives every model, and two models in another archive.
 fn downloads() -> Folder {
     let cube = textured_cube();
     let names = cube.names();
@@ -53,7 +53,7 @@ fn an_archive_with_several_models_is_a_folder_of_them() {
         assert!(folder.has(name), "{name}");
     }
     folder.render(&["all", "-o", "thumbs/", "--update"]).ends(0).says(&["0 pictures of 3 inputs, 3 up to date"]);
-    // Another model in the archive: the others are the same as they were.
+    // One model of the archive changes: the others stay up to date.
     let changed = CUBE.replacen("1", "1.25", 1);
     std::fs::write(
         folder.path("all/pack.zip"),
@@ -66,7 +66,7 @@ fn an_archive_with_several_models_is_a_folder_of_them() {
         .ends(0)
         .says(&["2 pictures of 2 inputs"]);
     assert!(folder.has("pack/a/one.jpg") && folder.has("pack/b/two.jpg"));
-    // With a slash behind it, and a folder in it.
+    // The archive with a trailing slash, and a folder inside it.
     folder.render(&["all/pack.zip/"]).ends(0).says(&["2 pictures of 2 inputs"]);
     assert!(folder.has("pack/a/one.png") && folder.has("pack/b/two.png"));
     folder.render(&["all/pack.zip/b", "-o", "{dir}.png"]).ends(1).says(&["what should be its folder is a file"]);
@@ -81,7 +81,7 @@ fn archives_of_one_layout_do_not_meet_in_their_pictures() {
     let folder = Folder::new().file("a.zip", pack()).file("b.zip", pack());
     folder.render(&["a.zip", "b.zip", "-o", "thumbs/"]).ends(0).says(&["4 pictures of 4 inputs"]);
     assert!(folder.has("thumbs/a/models/rock.png") && folder.has("thumbs/b/models/rock.png"));
-    // The pictures know where they come from, also where that lies beside them by now.
+    // The pictures record the source of their models, even when both have moved together since.
     std::fs::create_dir(folder.path("moved")).unwrap();
     std::fs::rename(folder.path("b.zip"), folder.path("moved/b.zip")).unwrap();
     std::fs::rename(folder.path("thumbs/b/models/rock.png"), folder.path("moved/rock.png")).unwrap();
@@ -149,7 +149,7 @@ fn a_picture_is_not_up_to_date_where_an_archive_stands_for_another_model_by_now(
     std::fs::write(folder.path("chair.zip"), pack(&[("chair.stl", stl), ("chair.obj", CUBE.as_bytes())])).unwrap();
     update().says(&["chair.png: 32×24"]);
     update().says(&["is up to date"]);
-    // Where a scene file shows it, too.
+    // A scene file that shows the archive notices, too.
     std::fs::write(folder.path("scene.toml"), "[[models]]\nfile = 'chair.zip'\n").unwrap();
     let update = || folder.render(&["scene.toml", "--update"]).ends(0);
     update();
@@ -204,7 +204,7 @@ fn no_output_replaces_an_archive_that_is_read() {
     assert!(folder.read("pack.json") == before);
 }
 
-/// What lies behind a link is what is read.
+/// A link counts as the file that it leads to.
 #[cfg(unix)]
 #[test]
 fn no_output_replaces_what_a_scene_file_names_by_a_link() {

@@ -1,4 +1,4 @@
-//! What is behind a model when nobody says.
+//! The default background of models.
 
 use super::program::{CUBE, Folder, picture};
 use meshray::image::statistics::{as_is, look};
@@ -18,7 +18,7 @@ fn triangle(material: &str) -> String {
 }
 
 const LIT: &str = r#"{"pbrMetallicRoughness":{"metallicFactor":0}}"#;
-/// What a material without any word is: white metal, as rough as can be.
+/// The default material: white metal, fully rough.
 const METAL: &str = "{}";
 const UNLIT: &str = r#"{"extensions":{"KHR_materials_unlit":{}}}"#;
 const GLOWING: &str = r#"{"emissiveFactor":[1,1,1],"pbrMetallicRoughness":{"baseColorFactor":[0,0,0,1]}}"#;

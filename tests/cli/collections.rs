@@ -1,10 +1,10 @@
-//! Whole folders of models, and pictures of them that are up to date.
+//! Whole folders of models, and pictures that are up to date.
 
 use super::program::{CUBE, Folder, Run, cube_with_a_bad_face, textured_cube};
 use meshray::image::{FileKind, Metadata, Output, Picture, encode};
 use std::path::MAIN_SEPARATOR;
 
-/// Three models in two folders, and what lies beside models.
+/// Three models in two folders, and other files among them.
 fn collection() -> Folder {
     let names = ["all/a.obj", "all/deep/a.obj", "all/deep/er/b.OBJ"];
     let folder = names.into_iter().fold(Folder::new(), |folder, name| folder.file(name, CUBE));
@@ -103,7 +103,7 @@ fn pictures_that_are_up_to_date_are_left_alone() {
     update(&[]).says(&["0 pictures of 3 inputs, 3 up to date"]);
     assert!(folder.read("thumbs/a.png").ends_with(b"appended"), "it was not written");
 
-    // What is asked for, what is in a file, and what is there.
+    // Pictures are remade when the options, the model file or the picture itself changes.
     update(&["--depth", "3"]).says(&["3 pictures of 3 inputs, 0 up to date"]);
     update(&["--depth", "3", "--threads", "1"]).says(&["0 pictures of 3 inputs, 3 up to date"]);
     std::fs::write(folder.path("all/deep/a.obj"), CUBE.replacen("1", "1.25", 1)).unwrap();
@@ -112,19 +112,19 @@ fn pictures_that_are_up_to_date_are_left_alone() {
     std::fs::write(folder.path("thumbs/a.png"), folder.read("thumbs/deep/a.png")).unwrap();
     update(&["--depth", "3"]).says(&["1 picture of 3 inputs, 2 up to date"]);
     folder.render(&[&words[..], &["--stats", "json"]].concat()).ends(2);
-    // A repetition is the same, byte by byte, and as new.
+    // A repetition is identical, byte for byte, and counts as up to date.
     let made = folder.read("thumbs/deep/a.png");
     folder.run(&["render", "--again", "thumbs/deep/a.png", "-o", "thumbs/deep/a.png"]).ends(0);
     assert!(folder.read("thumbs/deep/a.png") == made);
     update(&["--depth", "3"]).says(&["0 pictures of 3 inputs, 3 up to date"]);
 }
 
-/// Builds of one version may draw differently.
+/// Builds of the same version may draw differently.
 #[cfg(target_os = "linux")]
 #[test]
 fn pictures_of_another_build_are_made_again() {
     let folder = collection();
-    // By another process: a file that this one had open for writing might be busy when it is run.
+    // Copied by another process: a file that this one had open for writing might be busy when it is run.
     let copy = |more: &str| {
         let line = format!("cp '{}' other{more}", env!("CARGO_BIN_EXE_meshray"));
         assert!(
@@ -177,7 +177,7 @@ fn what_a_model_reads_beside_its_own_file_counts_too() {
     std::fs::write(folder.path(map), library.clone() + "\n# changed\n").unwrap();
     let run = update().ends(0);
     assert!(!run.stderr.contains("up to date") && run.errors().is_empty());
-    // What was looked for in vain may be there the next time.
+    // A file that was missing may exist the next time.
     std::fs::remove_file(folder.path(map)).unwrap();
     update().says(&[map]);
     update().says(&[map, "cube.png: is up to date"]);
@@ -214,7 +214,7 @@ fn frames_that_are_up_to_date_are_left_alone() {
     assert!(!run.stderr.contains("up to date"), "every step is another: {}", run.stderr);
 }
 
-/// Many models, of which some cannot be read, some are warned of, and some write where nothing can be written.
+/// Many models, of which some cannot be read, some cause warnings, and some have an output that cannot be written.
 fn many() -> Folder {
     let folder = (0..40).fold(Folder::new().file("out/kept.txt", ""), |folder, i| {
         let model = match i % 10 {
@@ -252,7 +252,7 @@ fn many_inputs_side_by_side_make_what_they_make_one_by_one_and_say_it_in_their_o
     folder.render(&["all", "-o", "out/", "--threads", "3", "--update"]).says(&[summary, "6 of them failed"]);
 }
 
-/// `t/b.png` is what `a.obj` shows, and where the picture of `b.obj` would go.
+/// `t/b.png` is the texture of `a.obj`, and also the output path of `b.obj`.
 fn with_a_texture_in_the_way() -> Folder {
     let cubes = |folder: Folder| (0..9).fold(folder, |folder, i| folder.file(&format!("m/z{i}.obj"), CUBE));
     let texture = textured_cube().read("cube.jpg");
@@ -274,7 +274,7 @@ fn no_picture_replaces_what_another_model_shows_neither_side_by_side_nor_when_th
         folder.render(&words).ends(1).says(&["t/b.png: would replace a file that is read"]);
         assert!(folder.read("t/b.png") == texture, "{words:?}");
     }
-    // Beside a model none is replaced that meshray did not write, read or not.
+    // Nor is any file beside a model replaced that meshray did not write, whether it is read or not.
     let folder = folder.file("m/b.png", "mine");
     folder.render(&["m/b.obj", "m/z1.obj", "-o", "m/{stem}.png"]).ends(1).says(&["m/b.png: exists and is no picture"]);
     #[cfg(unix)]
@@ -324,12 +324,12 @@ fn what_would_be_found_before_what_was_found_is_noticed() {
     std::fs::write(folder.path("cube.mtl"), "newmtl a\nmap_Kd CUBE.jpg\n").unwrap();
     update().ends(0);
     update().ends(0).says(&["cube.png: is up to date"]);
-    // Where that is another file.
+    // Only where file names are case-sensitive.
     if !folder.has("CUBE.jpg") {
         std::fs::copy(folder.path("cube.jpg"), folder.path("CUBE.jpg")).unwrap();
         assert!(!update().ends(0).stderr.contains("up to date"));
         update().ends(0).says(&["cube.png: is up to date"]);
     }
-    // With --strict it is another wish: there was to be no warning.
+    // --strict is a different request: no warnings are allowed.
     assert!(!folder.render(&["cube.obj", "--update", "--strict"]).stderr.contains("up to date"));
 }

@@ -1,4 +1,4 @@
-//! What each pixel cost: layers of an EXR, and heat maps.
+//! Costs of each pixel: layers of an EXR, and heat maps.
 
 use super::program::{Folder, picture};
 use meshray::image::{Channel, Picture};

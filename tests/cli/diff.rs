@@ -1,4 +1,4 @@
-//! `meshray diff`: figures, limits, pictures of the difference.
+//! `meshray diff`: figures, limits, difference pictures.
 
 use super::program::Folder;
 use meshray::image::{FileKind, Layers, Metadata, Output, Picture, ToneMap, encode, read_picture};

@@ -1,4 +1,4 @@
-//! Exit codes, and what is left behind by each ending.
+//! Exit codes, and the files left behind by each ending.
 
 use super::program::{BROKEN_GLB, Folder, NOTHING_TO_DRAW, cube_with_a_bad_face};
 
@@ -172,7 +172,7 @@ fn a_wrong_command_line_ends_in_2_and_names_the_nearest_word() {
         let value = wrong.split_once('=').unwrap().1;
         folder.run(&["render", "cube.obj", wrong]).ends(2).says(&[value]);
     }
-    // A number below 0 is a wrong colour and no flag.
+    // A number below 0 is an invalid colour, not a flag.
     folder.render(&["cube.obj", "--background", "-1,0,0"]).ends(2).says(&["-1,0,0", "three numbers from 0 to 1"]);
     folder.run(&["render"]).ends(2);
     assert_eq!(folder.names(), ["cube.obj"]);

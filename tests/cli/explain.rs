@@ -1,4 +1,4 @@
-//! `meshray explain`: what a mesh costs, and why.
+//! `meshray explain`: the costs of a mesh, and their causes.
 
 use super::program::{CUBE, Folder};
 use serde_json::Value;

@@ -1,4 +1,4 @@
-//! Every kind of file through every command that loads one, and the choice of a variant.
+//! Every file format through every command that loads one, and the choice of a variant.
 
 use super::program::{CUBE, Folder, picture};
 use serde_json::{Value, json};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
     element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";
 
-/// Two triangles of 50 bytes.
+/// An STL file of two triangles, 50 bytes each.
 fn stl() -> Vec<u8> {
     let mut out = b"solid? no: binary".to_vec();
     out.resize(80, 0);
@@ -83,7 +83,7 @@ fn points_and_lines_are_drawn_as_thick_as_inspect_says() {
     let words = ["render", "cross.obj", "--view", "front", "--size", "129x129", "--aa", "uniform", "--samples", "36"];
     folder.run(&[&words[..], &["--background", "transparent", "--tone-map", "none"]].concat()).ends(0);
     let shown = picture(&folder.path("cross.png"));
-    // The width is a 256th of ten units, and the picture less than 20 wide.
+    // Lines are 1/256 of ten units wide, and the picture shows less than 20 units.
     let [r, g, b, alpha] = shown.beauty[64 * 129 + 64];
     assert!(alpha > 0.05 && (r / alpha) > 0.99 && g == 0.0 && b == 0.0, "{:?}", shown.beauty[64 * 129 + 64]);
     let blue = shown.beauty.iter().filter(|p| p[2] > 0.0 && p[0] == 0.0).count();

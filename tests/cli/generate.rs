@@ -1,4 +1,4 @@
-//! `meshray generate`: a scene of the size that is wanted, which can be rendered and read by others.
+//! `meshray generate`: a scene of a given size, which can be rendered and read by other programs.
 
 use super::program::Folder;
 

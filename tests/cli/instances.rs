@@ -1,4 +1,4 @@
-//! `--instances`: what is stored once looks the same, and says so.
+//! `--instances`: instanced meshes look the same as flattened ones, and are reported.
 
 use super::program::Folder;
 use crate::common::bits;
@@ -60,7 +60,7 @@ fn more_than_fits_is_refused_before_it_is_flattened() {
     let limit = ["--max-memory", "2M"];
     let flat = [&["pots.glb", "--instances", "flatten"], &limit[..]].concat();
     folder.render(&flat).ends(1).says(&["11 instances", "2097152", "--instances auto", "--max-memory"]);
-    // So few are stored one by one where that fits.
+    // So few instances are flattened by default only where that fits.
     for how in ["keep", "auto"] {
         folder.render(&[&["pots.glb", "--instances", how], &limit[..]].concat()).ends(0);
     }
@@ -89,7 +89,7 @@ fn what_is_too_large_to_be_flattened_is_traced_and_measured_as_it_is_kept() {
     for name in ["places", "placed node", "placed block"] {
         assert!(named(&kept, name) && !named(&flat, name), "{name}: {kept}");
     }
-    // The hit lies in a box that the ray was told to have been in.
+    // The hit lies in a box that the walk reports to have visited.
     let t = kept["ray"]["hit"]["t"].as_f64().unwrap();
     let around = |visit: &Value| visit["t"][0].as_f64() <= Some(t) && Some(t) <= visit["t"][1].as_f64();
     assert!(visits(&kept).iter().any(|visit| visit["visit"] == "placed block" && around(visit)), "{kept}");

@@ -1,4 +1,4 @@
-//! Ctrl-C: over within a second, and no half picture.
+//! Ctrl-C: the program ends within a second, and leaves no half picture.
 #![cfg(unix)]
 
 use super::program::Folder;
@@ -12,7 +12,7 @@ fn start(folder: &Folder, arguments: &[&str]) -> Child {
 }
 
 fn signal(child: &Child) {
-    // Not that of Ctrl-C: whoever runs these in the background may have told them to take no notice of it.
+    // Not Ctrl-C's SIGINT: a shell that runs the tests in the background may have made it ignored.
     send(child, "-TERM");
 }
 
@@ -37,10 +37,10 @@ fn a_signal_that_whoever_started_it_wants_ignored_ends_nothing() {
     }
 }
 
-/// A render that takes minutes.
+/// A rendering that takes minutes.
 const LONG: [&str; 6] = ["render", "cube.obj", "--size", "4000x4000", "--samples", "256"];
 
-/// Starts what takes long, interrupts it after a while, and tells how and how fast it ended.
+/// Starts a long run, interrupts it after a while, and returns its exit status and how long it took to end.
 fn interrupted_after(folder: &Folder, arguments: &[&str], seconds: f64) -> (ExitStatus, Duration) {
     let mut child = start(folder, arguments);
     std::thread::sleep(Duration::from_secs_f64(seconds));
@@ -54,7 +54,7 @@ fn interrupted(folder: &Folder, arguments: &[&str]) -> (ExitStatus, Duration) {
     interrupted_after(folder, &[&LONG, arguments].concat(), 1.5)
 }
 
-/// A second is promised; a machine that is busy with other tests gets a few.
+/// The promise is one second; a machine that is busy with other tests gets a few.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 #[test]
@@ -78,7 +78,7 @@ fn what_is_done_is_kept_when_asked_for() {
 #[test]
 fn a_picture_is_kept_whose_costs_are_being_counted() {
     let folder = Folder::with_cube();
-    // Rays of the picture go together, those that are timed one by one, three times.
+    // Rays of the picture are traced in waves, those for timing one by one, three times.
     let words =
         ["render", "cube.obj", "--size", "1500x1500", "--quality", "draft", "--heatmap", "ms", "--keep-partial"];
     let (status, time) = interrupted_after(&folder, &words, 5.0);
@@ -89,7 +89,7 @@ fn a_picture_is_kept_whose_costs_are_being_counted() {
 
 #[test]
 fn a_file_that_is_being_written_when_the_signal_comes_is_finished() {
-    // Sometimes the file is finished before.
+    // Sometimes the file is finished before the signal.
     for _ in 0..5 {
         let folder = Folder::new();
         let mut child = start(&folder, &["generate", "tetra", "--size", "4e6", "-o", "tetra.glb"]);

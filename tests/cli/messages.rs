@@ -1,4 +1,4 @@
-//! What goes to stderr, in which form.
+//! Messages on stderr, and their forms.
 
 use super::program::{BROKEN_GLB, Folder, cube_with_a_bad_face};
 use serde_json::Value;
@@ -63,7 +63,7 @@ fn no_bar_and_no_colour_reach_a_pipe() {
     }
 }
 
-// No file of Windows can be called so.
+// Windows does not allow such a file name.
 #[cfg(unix)]
 #[test]
 fn a_file_name_cannot_write_to_the_terminal() {
@@ -101,19 +101,19 @@ fn pictures_that_show_next_to_nothing_are_written_with_a_warning() {
         .render(&away)
         .ends(0)
         .says(&["warning: cube.obj: given eye: none of 4096 rays", "aim the eye with --at"]);
-    // Whatever finds the hits.
+    // Whatever structure traces the rays, and in dry runs.
     for more in [["--accel", "none"], ["--dry-run", "-q"]] {
         let run = Folder::with_cube().render(&[&away[..], &more, &["--strict"]].concat()).ends(3);
         assert_eq!(run.says(&["none of 4096 rays", "--strict"]).text(), "");
     }
-    // Neither of two halves of the model can be called stray.
+    // Neither half of the model can count as stray.
     let apart = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 100000 0 0\nv 100001 0 0\nv 100000 1 0\nf 1 2 3\nf 4 5 6\n";
     let folder = Folder::new().file("apart.obj", apart);
     folder
         .render(&["apart.obj"])
         .ends(0)
         .says(&["warning: apart.obj: default view: none of 4096 rays", "far from each other"]);
-    // It stands in the middle, where pixels of an even number of columns meet.
+    // The face stands in the middle, on the border between two pixel columns.
     let (x, y) = ([0.0, 0.3, 0.3, 0.0], [0.0, 0.0, 99.0, 99.0]);
     let thin: String = (0..4).map(|i| format!("v {} {} 0\n", x[i], y[i])).collect();
     let run = Folder::new().file("thin.obj", thin + "f 1 2 3 4\n").render(&["thin.obj", "--view", "front"]).ends(0);

@@ -1,4 +1,4 @@
-//! The program from outside: what scripts and people rely on.
+//! The program from outside: everything that scripts and people rely on.
 
 mod again;
 mod animation;

@@ -1,4 +1,4 @@
-//! Where pictures go, of which type, and what may be replaced.
+//! Output paths, picture types, and which files may be replaced.
 
 use super::program::{CUBE, Folder, Run, picture, textured_cube};
 
@@ -68,7 +68,7 @@ fn a_link_does_not_lead_a_picture_over_the_model_or_its_textures() {
         assert!(folder.read(target) == before, "{target}");
         std::fs::remove_file(folder.path("link.png")).unwrap();
     }
-    // Through a link to anything else the picture goes where it leads.
+    // Through a link to anything else, the picture is written to the link's target.
     symlink(folder.path("real.png"), folder.path("link.png")).unwrap();
     let folder = folder.file("real.png", "old");
     folder.render(&["cube.obj", "-o", "link.png"]).ends(0);
@@ -217,7 +217,7 @@ fn an_exr_has_layers_when_they_are_asked_for() {
 fn sixteen_bits_are_written_when_asked_for() {
     let folder = Folder::with_cube();
     folder.render(&["cube.obj", "--bits", "16"]).ends(0);
-    // Byte 24 of a PNG is the depth of its samples.
+    // Byte 24 of a PNG is the bit depth.
     assert_eq!(folder.read("cube.png")[24], 16);
 }
 
@@ -276,7 +276,7 @@ fn models_in_one_scene_share_the_memory_that_is_allowed() {
         let merged = ["--merge", "--dry-run", "--max-memory", "5M"];
         folder.render(&[&vec![model; times][..], &merged].concat())
     };
-    // The text of one is gone before that of the next.
+    // The text of each file is freed before the next one is read.
     render("cube.obj", 40).ends(0);
     render("mesh.obj", 2).ends(0);
     render("mesh.obj", 60).ends(1).says(&["mesh.obj", "--max-memory"]);
@@ -304,7 +304,7 @@ fn a_file_that_a_model_names_and_that_is_too_large_ends_in_1_too() {
 fn a_file_that_is_too_large_whatever_the_memory_ends_in_3() {
     let folder = Folder::new();
     let long = std::fs::File::create(folder.path("long.obj")).unwrap();
-    // A hole, which takes no room on the disk.
+    // A sparse file, which takes no space on disk.
     long.set_len(5 << 30).unwrap();
     let run = folder.render(&["long.obj", "--max-memory", "64G"]).ends(3);
     run.says(&["5368709120 bytes where 4294967296 are allowed"]);

@@ -1,4 +1,4 @@
-//! `--profile`: where a picture's time went.
+//! `--profile`: the time spent on each part of a picture.
 
 use super::program::Folder;
 use serde_json::Value;

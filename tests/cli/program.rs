@@ -1,4 +1,4 @@
-//! The program as its users meet it: a folder with files, a command line, an exit code, two streams.
+//! The program as seen by its users: a folder with files, a command line, an exit code, two streams.
 
 use assert_cmd::Command;
 use meshray::image::{FileKind, Metadata, Output, Picture, encode};
@@ -11,18 +11,18 @@ pub const CUBE: &str = "\
 v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1
 f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
-/// The same cube with one more face, which has no area and is dropped: a warning.
+/// The same cube with one more face, which has no area and is dropped with a warning.
 pub fn cube_with_a_bad_face() -> String {
     format!("{CUBE}f 1 1 2\n")
 }
 
-/// Points and lines that stand nowhere.
+/// Points and lines with a non-finite position.
 pub const NOTHING_TO_DRAW: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\np 4\nl 1 4\n";
 
-/// A GLB whose header promises more than there is.
+/// A GLB whose header gives a greater length than the file has.
 pub const BROKEN_GLB: &[u8] = b"glTF\x02\0\0\0\xff\xff\0\0\x10\0\0\0JSON{\"asset\":";
 
-/// A folder that lives as long as the test.
+/// A temporary folder that is removed with this value.
 pub struct Folder(TempDir);
 
 /// A folder with a cube whose material has a texture, `cube.jpg`.
@@ -35,9 +35,9 @@ pub fn textured_cube() -> Folder {
         .file("cube.jpg", texture)
 }
 
-/// How a run ended.
+/// Result of a run.
 pub struct Run {
-    /// The exit code; `None` when a signal ended it.
+    /// Exit code; `None` when a signal ended the run.
     pub code: Option<i32>,
     pub stdout: Vec<u8>,
     pub stderr: String,
@@ -53,7 +53,7 @@ impl Folder {
         Self::new().file("cube.obj", CUBE)
     }
 
-    /// Adds a file, and the folders it lies in.
+    /// Adds a file, and its parent folders.
     pub fn file(self, name: &str, content: impl AsRef<[u8]>) -> Self {
         let path = self.path(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -74,7 +74,7 @@ impl Folder {
         self.path(name).exists()
     }
 
-    /// Names of everything in the folder itself, sorted.
+    /// Names of all entries of the folder itself, sorted.
     pub fn names(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.0.path()).unwrap();
         let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
@@ -82,14 +82,14 @@ impl Folder {
         names
     }
 
-    /// The program, about to run in this folder.
+    /// Returns the program, ready to run in this folder.
     pub fn program(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_meshray"));
         command.current_dir(self.0.path()).args(arguments).timeout(Duration::from_secs(300));
         command
     }
 
-    /// Runs the program with a command line.
+    /// Runs the program with these arguments.
     pub fn run(&self, arguments: &[&str]) -> Run {
         Run::of(&mut self.program(arguments))
     }
@@ -107,7 +107,7 @@ impl Run {
         Self { code: output.status.code(), stdout: output.stdout, stderr }
     }
 
-    /// Fails the test unless the run ended with this code; a panic of the program never passes.
+    /// Fails the test unless the run ended with this code; a panic of the program always fails.
     #[track_caller]
     pub fn ends(self, code: i32) -> Self {
         assert_eq!(self.code, Some(code), "exit code, with this on stderr:\n{}", self.stderr);

@@ -1,4 +1,4 @@
-//! What a scene does not need is left out, and does not show.
+//! Pruning: work that a scene does not need is skipped, without a trace in the pixels.
 
 use super::program::Folder;
 use crate::common::models;

@@ -1,4 +1,4 @@
-//! Structure, number of threads and instruction set do not show in the pixels.
+//! Structure, number of threads and instruction set do not affect the pixels.
 
 use super::program::{Folder, picture};
 use crate::common::{bits, models};
@@ -7,7 +7,7 @@ use meshray::math::simd::Level;
 
 const THREADS: [&str; 3] = ["1", "2", "7"];
 
-/// Renders with each structure and compares the bits: the default with each number of threads, the others with one of the
+/// Renders with each structure and compares the bits: the default one with each number of threads, the others with one of the
 /// numbers, in turn.
 fn all_agree(folder: &Folder, input: &str, size: &str, structures: &[&str]) {
     let mut first = None;
@@ -25,7 +25,7 @@ fn all_agree(folder: &Folder, input: &str, size: &str, structures: &[&str]) {
     }
 }
 
-/// Every ray against every prim takes minutes: slow structures render only a model of a few prims here, and the others
+/// Tracing every ray against every prim takes minutes: here slow structures render only a model of a few prims, and the others
 /// through the library, smaller (`models`).
 #[test]
 fn every_model_gives_the_same_bits_with_every_structure_and_any_threads() {

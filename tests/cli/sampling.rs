@@ -1,4 +1,4 @@
-//! How pixels are sampled: flags, layers, statistics, and pictures that repeat themselves.
+//! Sampling of pixels: flags, layers, statistics, and repeatable pictures.
 
 use super::program::{Folder, picture};
 use meshray::image::{FileKind, Metadata, Output, encode, read_metadata};

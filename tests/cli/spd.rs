@@ -1,8 +1,8 @@
-//! Our counts beside those published of the Standard Procedural Databases.
+//! Our counts beside those published for the Standard Procedural Databases.
 
 use super::program::Folder;
 
-/// One ball on a floor, under the name of one of the published scenes.
+/// One ball on a floor, under the name of a published scene.
 const BALLS: &str = "b 0 0 0\nv\nfrom 0 0 10\nat 0 0 0\nup 0 1 0\nangle 30\nhither 1\nresolution 512 512\nl 3 3 20\n\
                      f 1 1 1 0.5 0.5 10 0 0\np 4\n9 9 0\n-9 9 0\n-9 -9 0\n9 -9 0\ns 0 0 1 1\n";
 
@@ -10,7 +10,7 @@ const BALLS: &str = "b 0 0 0\nv\nfrom 0 0 10\nat 0 0 0\nup 0 1 0\nangle 30\nhith
 fn other_scenes_than_the_published_ones_are_told_from_them() {
     let folder = Folder::new().file("balls.nff", BALLS);
     let run = folder.run(&["bench", "--spd", ".", "--slow-tests", "2000", "--report", "spd.json", "-q"]);
-    // Every eye ray of both hits the floor; but there are 7382 objects in theirs.
+    // In both scenes every eye ray hits the floor, but the published one has 7382 objects.
     let run = run.ends(1);
     for words in
         ["balls: 2 objects (7 382 published)", "same hits, bit for bit", "equal to Havran and Sixta's in 1 of 1"]

@@ -1,4 +1,4 @@
-//! `meshray study`: rows as they come, reports, what is advised.
+//! `meshray study`: rows as they are measured, reports, and advice.
 
 use super::program::Folder;
 use serde_json::Value;

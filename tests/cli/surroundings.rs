@@ -1,4 +1,4 @@
-//! What lights a model besides its own lamps.
+//! Lighting of a model besides its own lamps.
 
 use super::program::{Folder, picture};
 use image::{Rgb, Rgb32FImage};
@@ -71,7 +71,7 @@ fn black_surroundings_take_the_place_of_default_lights_and_leave_lamps_of_the_fi
     };
     for model in ["cube.obj", "bare.toml"] {
         assert_eq!(brightest(model, &["--env", "black"]), 0.0, "{model}");
-        // A scene that says nothing is lit, though nothing surrounds it.
+        // A scene that asks for nothing is lit, although it has no surroundings.
         assert!(brightest(model, &[]) > 0.1, "{model}");
     }
     let lit = brightest("lit.toml", &[]);

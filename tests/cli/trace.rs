@@ -1,4 +1,4 @@
-//! `meshray trace`: the tree of rays of a sample.
+//! `meshray trace`: the ray tree of a sample.
 
 use super::program::{Folder, picture, textured_cube};
 use serde_json::Value;
@@ -93,7 +93,7 @@ fn the_picture_of_a_ray_is_a_png_that_replaces_no_input() {
     folder.run(&[&arguments[..], &["-o", "ray.png"]].concat()).ends(0).says(&["ray.png"]);
     let drawn = picture(&folder.path("ray.png"));
     assert!(drawn.width > drawn.height && drawn.height > 600);
-    // White is the ray.
+    // The ray is white.
     let white = drawn.beauty.iter().filter(|p| p[..3] == [1.0; 3]).count();
     assert!(white > 100, "{white} white pixels");
     folder.run(&[&arguments[..], &["-o", "ray.exr"]].concat()).ends(2);

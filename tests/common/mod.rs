@@ -1,4 +1,4 @@
-//! What several subjects need: the repository and its models, pictures of scenes.
+//! Helpers for several subjects: the repository and its models, pictures of scenes.
 
 #![allow(dead_code, reason = "which of it is used depends on the features that are built")]
 
@@ -11,12 +11,12 @@ use meshray::render::{Job, Settings, View, World, render};
 use meshray::scene::{Background, Scene, default_light, framing};
 use std::path::{Path, PathBuf};
 
-/// The repository.
+/// Root folder of the repository.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Every model and scene file in `models/` that can be rendered by itself, sorted by name.
+/// All model and scene files in `models/` that can be rendered by themselves, sorted by name.
 pub fn models() -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut folders = vec![root().join("models")];
@@ -36,14 +36,14 @@ pub fn models() -> Vec<PathBuf> {
     found
 }
 
-/// A picture of a loaded scene as a user gets it who asks for nothing: framed and lit, on nothing, one sample a pixel,
-/// with layers. `None`: the scene holds nothing to draw.
+/// Renders a loaded scene with a user's defaults: framed and lit, on a transparent background, one sample a pixel, with layers.
+/// `None`: the scene holds nothing to draw.
 pub fn still(scene: Scene, kind: AccelKind, width: u32, height: u32) -> Option<Picture> {
     let [picture] = stills(scene, kind, (width, height), [false])?;
     Some(picture)
 }
 
-/// The same several times, the points of surfaces shaded one by one or not.
+/// Renders the same picture several times, each time with points shaded one by one or not.
 pub fn stills<const N: usize>(
     mut scene: Scene,
     kind: AccelKind,
@@ -70,7 +70,7 @@ pub fn stills<const N: usize>(
     Some(one_by_one.map(picture))
 }
 
-/// Pixels and layers as bits, so that zeros of both signs and NaN are told apart.
+/// Pixels and layers as bits, so that zeros of both signs and NaN are distinguished.
 pub fn bits(picture: &Picture) -> Vec<u32> {
     let layers = picture.layers.as_ref().expect("the picture has layers");
     let colors = picture.beauty.iter().flatten();

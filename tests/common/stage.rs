@@ -1,4 +1,4 @@
-//! Little scenes built in code, and their pictures: a stage is set with a few calls and rendered through the library.
+//! Small scenes built in code, and their pictures: a stage is set with a few calls and rendered through the library.
 
 use meshray::accel::{AccelKind, AccelParams, AnyAccel};
 use meshray::image::Picture;
@@ -11,7 +11,7 @@ use meshray::scene::{
     Plane, Reflection, Sampler, Scene, Sphere, Texture, TextureRef, UvTransform,
 };
 
-/// A scene and an eye.
+/// A scene, a view and the settings.
 pub struct Stage {
     pub scene: Scene,
     pub view: View,
@@ -19,7 +19,7 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// An empty, dark stage seen from `eye` towards `at`, 40 degrees high, 96×72 pixels of 9 samples.
+    /// An empty, dark stage seen from `eye` towards `at`, with a vertical field of view of 40 degrees, 96×72 pixels of 9 samples.
     pub fn new(eye: [f64; 3], at: [f64; 3]) -> Self {
         let lens = Lens::perspective(40.0_f64.to_radians());
         let view = View::look_at(eye.into(), at.into(), DVec3::Y, lens);
@@ -32,7 +32,7 @@ impl Stage {
         self.scene.materials.len() as u32 - 1
     }
 
-    /// Phong without gloss.
+    /// Adds a Phong material without gloss.
     pub fn matt(&mut self, color: [f32; 3]) -> u32 {
         self.material(phong(color, Phong::default()))
     }
@@ -41,20 +41,20 @@ impl Stage {
         self.scene.spheres.push(Sphere { name: String::new(), center: center.into(), radius, material });
     }
 
-    /// The plane y = `height`, seen from above.
+    /// Adds the plane y = `height`, visible from above.
     pub fn floor(&mut self, height: f64, material: u32) {
         self.scene.planes.push(Plane { name: String::new(), normal: DVec3::Y, offset: height, material });
     }
 
-    /// Adds a mesh where it stands.
+    /// Adds a mesh in world coordinates.
     pub fn mesh(&mut self, mesh: Mesh) {
         self.scene.meshes.push(mesh);
         let mesh = self.scene.meshes.len() as u32 - 1;
         self.scene.instances.push(Instance { name: String::new(), mesh, world_from_object: DAffine3::IDENTITY });
     }
 
-    /// A flat four-sided face, counter-clockwise from the front; texture coordinates `tiles` times 0…1, the first
-    /// corner at the lower left.
+    /// Adds a flat quad, counter-clockwise from the front; texture coordinates `tiles` times 0…1, the first corner at the lower
+    /// left.
     pub fn quad(&mut self, corners: [[f32; 3]; 4], tiles: f32, material: u32) {
         let uv = [[0.0, tiles], [tiles, tiles], [tiles, 0.0], [0.0, 0.0]];
         self.mesh(Mesh {
@@ -66,13 +66,13 @@ impl Stage {
         });
     }
 
-    /// A square in the plane z = `z`, facing +z.
+    /// Adds a square in the plane z = `z`, facing +z.
     pub fn card(&mut self, x: f32, y: f32, z: f32, half: f32, material: u32) {
         let at = |dx: f32, dy: f32| [x + dx * half, y + dy * half, z];
         self.quad([at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)], 1.0, material);
     }
 
-    /// A texture of `side`×`side` texels, sRGB-coded RGBA.
+    /// Adds a texture of `side`×`side` texels, sRGB-coded RGBA.
     pub fn texture(&mut self, side: u32, sampler: Sampler, texel: impl Fn(u32, u32) -> [u8; 4]) -> TextureRef {
         let texels = (0..side * side).map(|i| texel(i % side, i / side)).collect();
         self.scene.bitmaps.push(Bitmap {
@@ -86,13 +86,13 @@ impl Stage {
         TextureRef { texture, uv_set: 0, transform: UvTransform::default() }
     }
 
-    /// Light along a direction.
+    /// Adds a directional light.
     pub fn sun(&mut self, direction: [f64; 3], intensity: f32) {
         let direction = DVec3::from(direction).normalize();
         self.light([intensity; 3], LightKind::Directional { direction });
     }
 
-    /// A point light as bright at every distance.
+    /// Adds a point light without falloff.
     pub fn lamp(&mut self, position: [f64; 3], intensity: [f32; 3]) {
         self.light(intensity, LightKind::Point { position: position.into(), falloff: Falloff::None });
     }
@@ -107,7 +107,7 @@ impl Stage {
         });
     }
 
-    /// The studio around the stage.
+    /// Adds the studio around the stage.
     pub fn studio(&mut self) {
         self.scene.environment = Environment::Studio;
     }
@@ -132,7 +132,7 @@ impl Stage {
     }
 }
 
-/// A Phong material seen from both sides.
+/// A double-sided Phong material.
 pub fn phong(color: [f32; 3], phong: Phong) -> Material {
     Material {
         base_color: color.into(),
@@ -142,7 +142,7 @@ pub fn phong(color: [f32; 3], phong: Phong) -> Material {
     }
 }
 
-/// A metallic-roughness material seen from both sides.
+/// A double-sided metallic-roughness material.
 pub fn metal_rough(color: [f32; 3], model: MetalRough) -> Material {
     Material {
         base_color: color.into(),
@@ -152,7 +152,7 @@ pub fn metal_rough(color: [f32; 3], model: MetalRough) -> Material {
     }
 }
 
-/// A material that shows its colour whatever the light.
+/// An unlit material: it shows its colour whatever the light.
 pub fn unlit(color: [f32; 3]) -> Material {
     Material { base_color: color.into(), double_sided: true, reflection: Reflection::Unlit, ..Material::default() }
 }

@@ -1,4 +1,4 @@
-//! Surfaces with more lobes than that of their facets.
+//! Surfaces with further lobes besides that of their facets.
 
 use super::check_all;
 use super::pictures::checkered_floor;

@@ -1,12 +1,12 @@
 //! Pictures against stored ones: 96×72 pixels, one feature each.
 //!
-//! A picture is compared with `tests/golden/NAME.png`. Pixels are equal on every machine by construction, but the
-//! encoder may round the last code differently after a change that means no harm, so a few steps are let pass: a pixel
-//! is *off* when a channel differs by more than [`STEP`], and [`MOST_OFF`] of the pixels may be. A failure leaves
-//! `expected | difference × 8 | actual` in `target/tmp/golden/NAME.png`.
+//! A picture is compared with `tests/golden/NAME.png`. Pixels are equal on every machine by construction, but the encoder may
+//! round the last code differently after a harmless change, so a few steps are tolerated: a pixel is *off* when a channel differs
+//! by more than [`STEP`], and at most [`MOST_OFF`] of the pixels may be. A failure leaves `expected | difference × 8 | actual` in
+//! `target/tmp/golden/NAME.png`.
 //!
-//! `MESHRAY_RECORD=1 cargo test --test main golden` stores what is rendered now, and fails: look at the pictures, then
-//! run again without it.
+//! `MESHRAY_RECORD=1 cargo test --test main golden` stores the pictures as rendered now, and fails: look at them, then run again
+//! without it.
 
 mod lobes;
 mod pictures;
@@ -17,14 +17,14 @@ use meshray::image::diff::{Space, compare, side_by_side};
 use meshray::image::{FileKind, Metadata, Output, Picture, ToneMap, decode, encode};
 use std::path::{Path, PathBuf};
 
-/// Largest difference of a display code (0..=1) that passes: two of 255 steps.
+/// Greatest tolerated difference of a display code (0..=1): two of 255 steps.
 const STEP: f64 = 2.5 / 255.0;
-/// Part of the pixels that may differ by more.
+/// Fraction of the pixels that may differ by more.
 const MOST_OFF: f64 = 0.002;
 /// Enough for every picture here.
 const MAX_PIXELS: u64 = 1 << 20;
 
-/// The values as rendered, transparency kept: what golden pictures store.
+/// Output settings of golden pictures: the values as rendered, transparency kept.
 fn plain() -> Output {
     Output { tone_map: ToneMap::None, ..Output::default() }
 }
@@ -54,7 +54,7 @@ fn check_all(pictures: &[(&str, &Picture, &Output)]) {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Whether `actual` is near enough to the stored file; if not, what is wrong, and a picture of it in `folder`.
+/// Compares `actual` with the stored file; on failure returns the reason and leaves a comparison picture in `folder`.
 fn judge(name: &str, stored: Option<&[u8]>, actual: &[u8], folder: &Path) -> Result<(), String> {
     let actual = decode(actual, MAX_PIXELS).map_err(|e| e.to_string())?;
     let Some(stored) = stored else {
@@ -96,7 +96,7 @@ fn a_difference_fails_and_is_drawn() {
     assert!(fault.contains("1 of 100 pixels"), "{fault}");
     let drawn = meshray::image::read_picture(&folder.path().join("off.png")).unwrap();
     assert_eq!((drawn.width, drawn.height), (30, 10));
-    // The middle third is black but for the pixel that is off.
+    // The middle third, the difference, is black but for the pixel that is off.
     assert!(drawn.beauty[17][0] > 0.1 && drawn.beauty[16][..3] == [0.0; 3]);
 
     assert!(judge("size", Some(&stored), &grey(11, 0.5), folder.path()).unwrap_err().contains("11×10"));

@@ -1,4 +1,4 @@
-//! The pictures: each test sets a stage for one feature.
+//! The golden pictures: each test sets a stage for one feature.
 
 use super::{check, check_all, plain};
 use crate::common::stage::{Stage, metal_rough, phong, unlit};
@@ -19,19 +19,19 @@ const RED: [f32; 3] = [0.8, 0.1, 0.05];
 const BLUE: [f32; 3] = [0.05, 0.15, 0.8];
 const GREY: [f32; 3] = [0.5; 3];
 
-/// Seen from the front and a little from above, a sphere of radius 1 fills most of the height.
+/// A stage seen from the front and slightly above; a sphere of radius 1 fills most of the height.
 fn front() -> Stage {
     Stage::new([0.0, 0.6, 3.6], [0.0, 0.0, 0.0])
 }
 
-/// Straight from the front: flat things stay undistorted, x and y reach ±1.33 and ±1.
+/// A stage seen straight from the front by parallel rays: flat objects stay undistorted, x and y reach ±1.33 and ±1.
 fn flat() -> Stage {
     let mut stage = Stage::new([0.0, 0.0, 5.0], [0.0; 3]);
     stage.view = View::look_at(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, DVec3::Y, Lens::orthographic(2.0));
     stage
 }
 
-/// A floor of black and white squares, one unit each, far enough for every view here.
+/// Adds a floor of black and white squares, one unit each, large enough for every view here.
 pub(super) fn checkered_floor(stage: &mut Stage, height: f32) {
     let squares = stage.texture(2, Sampler { magnify: Filter::Nearest, ..Sampler::default() }, |x, y| {
         if (x + y) % 2 == 0 { [235, 235, 235, 255] } else { [40, 40, 40, 255] }
@@ -215,7 +215,7 @@ fn golden_textures_repeat_mirror_and_clamp_sharp_and_smooth() {
 fn golden_a_texture_is_moved_turned_and_scaled() {
     let mut stage = flat();
     let letter = |x: u32, y: u32| {
-        // An L of 8×8 texels, so that every turn and mirror shows.
+        // An L of 8×8 texels, so that every rotation and mirroring shows.
         let ink = (1..3).contains(&x) && (1..7).contains(&y) || (1..6).contains(&x) && (5..7).contains(&y);
         if ink { [200, 30, 30, 255] } else { [230, 230, 200, 255] }
     };
@@ -254,7 +254,7 @@ fn golden_cut_out_shapes_throw_cut_out_shadows() {
 #[test]
 fn golden_normal_maps_and_bump_maps_shape_the_light() {
     let mut stage = flat();
-    // The same hemisphere on a plain ground, once as normals and once as heights.
+    // The same hemisphere on plain ground, once as normals and once as heights.
     let dome = |x: u32, y: u32| {
         let (dx, dy) = ((f64::from(x) - 31.5) / 24.0, (f64::from(y) - 31.5) / 24.0);
         let height = (1.0 - dx * dx - dy * dy).max(0.0).sqrt();
@@ -313,7 +313,7 @@ fn golden_vertex_colours_blend_across_a_face() {
     check("vertex-colours", &stage.render());
 }
 
-/// A ball of `2 × rings²` triangles; normals only when smooth.
+/// A ball of `2 × rings²` triangles; with normals only if smooth.
 fn ball(rings: u32, smooth: bool, at: Vec3, material: u32) -> Mesh {
     let point = |ring: u32, step: u32| {
         let (polar, around) = (
@@ -342,7 +342,7 @@ fn ball(rings: u32, smooth: bool, at: Vec3, material: u32) -> Mesh {
     Mesh { material, positions, normals, triangles, ..Mesh::default() }
 }
 
-/// The point of a unit sphere at two angles.
+/// Point of the unit sphere at two angles.
 fn on_sphere(polar: f32, around: f32) -> Vec3 {
     Vec3::new(polar.sin() * around.sin(), polar.cos(), polar.sin() * around.cos())
 }
@@ -393,7 +393,7 @@ fn golden_a_back_face_is_unseen_unless_double_sided() {
     for (x, double_sided) in [(-0.65, false), (0.65, true)] {
         let material = stage.material(Material { double_sided, ..phong(RED, Phong::default()) });
         let at = |dx: f32, dy: f32| [x + dx * 0.5, dy * 0.7, 0.0];
-        // Clockwise from the eye: its back.
+        // Clockwise as seen from the eye, which therefore sees the back.
         stage.quad([at(-1.0, -1.0), at(-1.0, 1.0), at(1.0, 1.0), at(1.0, -1.0)], 1.0, material);
     }
     stage.sun([0.3, -0.3, -1.0], 0.9);
@@ -423,7 +423,7 @@ fn golden_the_studio_is_behind_when_asked_for() {
     check_all(&[("studio", &stage.render(), &Output::default())]);
 }
 
-/// A ball and a card before a checkered floor, under a wide lamp.
+/// A ball and a card before a checkered floor, under an area light.
 fn edges_and_soft_shadows() -> Stage {
     let mut stage = Stage::new([0.0, 1.2, 5.0], [0.0, 0.0, 0.0]);
     stage.scene.background = Some(Background::Color(Vec3::splat(0.3)));
@@ -460,7 +460,7 @@ fn golden_a_prism_spreads_white_light() {
     let glass = Phong { transmission: Vec3::ONE, ior: 1.6, dispersion: 1.0, fresnel: true, ..Phong::default() };
     let material = stage.material(phong([0.0; 3], glass));
     let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
-    // Upright wedge, its edge on top.
+    // An upright wedge, its edge on top.
     let positions = vec![
         corner(-0.9, -0.8, 0.7),
         corner(0.9, -0.8, 0.7),
@@ -485,7 +485,7 @@ fn golden_a_prism_spreads_white_light() {
 fn golden_a_concave_polygon_stays_whole() {
     let mut stage = flat();
     let material = stage.material(unlit(BLUE));
-    // A star of ten corners around a hole that the crossing test must leave out: an arrow cut into its side.
+    // A star of ten corners, whose notches the crossing test must leave out.
     let radius = |i: u8| if i.is_multiple_of(2) { 0.95_f32 } else { 0.35 };
     let angle = |i: u8| f32::from(i) * std::f32::consts::TAU / 10.0;
     let positions: Vec<Vec3> =
@@ -502,7 +502,7 @@ fn golden_a_concave_polygon_stays_whole() {
 
 #[test]
 fn golden_tone_maps_bend_bright_light_each_in_its_way() {
-    // Brightness doubles eight times from left to right, hues lie from top to bottom.
+    // Brightness doubles eight times from left to right; hues vary from top to bottom.
     let pixel = |i: u16| {
         let (x, y) = (i % 96, i / 96);
         let light = 0.05 * (f32::from(x) / 12.0).exp2();
@@ -524,7 +524,7 @@ fn golden_points_and_lines_are_thin_solids() {
     let read = |name: &str, text: String| {
         load_bytes(Path::new(name), text.into_bytes(), &LoadOptions::default()).unwrap().scene
     };
-    // A cube of wires and its corners, in colours and without light.
+    // A wireframe cube and its corners, coloured and unlit.
     let mut cube = String::new();
     for i in 0..8 {
         let bit = |k: i32| i >> k & 1;

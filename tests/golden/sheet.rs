@@ -1,4 +1,4 @@
-//! One picture of many: every model that others made, 16×16 pixels each, in the order of a list of names beside it.
+//! A contact sheet of all third-party models, 16×16 pixels each, in the order of a list of names beside it.
 
 use crate::common::root;
 use image::{ImageFormat, Rgb, RgbImage};
@@ -6,24 +6,24 @@ use meshray::image::Picture;
 use meshray::image::srgb::encode8;
 use std::path::PathBuf;
 
-/// Pixels of a side of a tile, and tiles in a row.
+/// Side of a tile in pixels, and number of tiles in a row.
 const SIDE: u32 = 16;
 const ROW: u32 = 20;
 
-/// Mean difference of the display codes of a tile that passes: edges of models may move by a sample.
+/// Tolerated mean difference of a tile's display codes: edges of models may move by a sample.
 const STEP: f64 = 3.0;
 
-/// Behind the models.
+/// Background of the models.
 const GREY: f32 = 0.2;
 
-/// Tiles by name.
+/// Tiles, with the names of their models.
 #[derive(Default)]
 pub struct Sheet {
     tiles: Vec<(String, RgbImage)>,
 }
 
 impl Sheet {
-    /// Adds a small copy of a picture whose sides are multiples of the tile's.
+    /// Adds a reduced copy of a picture whose sides are multiples of the tile's.
     pub fn add(&mut self, name: &str, picture: &Picture) {
         let (columns, rows) = (picture.width / SIDE, picture.height / SIDE);
         let tile = RgbImage::from_fn(SIDE, SIDE, |x, y| {
@@ -39,7 +39,8 @@ impl Sheet {
         self.tiles.push((name.to_owned(), tile));
     }
 
-    /// What looks otherwise than stored, by name; with `MESHRAY_RECORD` the sheet is stored anew.
+    /// Compares the tiles with the stored ones, and returns the differences by name; with `MESHRAY_RECORD`, stores the sheet
+    /// anew.
     pub fn faults(&self) -> Vec<String> {
         let (picture, names) = (stored("png"), stored("txt"));
         if std::env::var_os("MESHRAY_RECORD").is_some() {
