@@ -54,7 +54,7 @@ pub(super) trait ShadingPoint {
     }
 }
 
-/// A shaded point and the ray that found it.
+/// A shaded point and the ray that hit it.
 pub(super) struct PathVertex<'a, G> {
     pub ray: &'a Ray,
     pub hit: &'a Hit,

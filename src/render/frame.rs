@@ -92,7 +92,7 @@ pub(super) fn pixel_key(seed: u64, (x, y): (u32, u32)) -> u32 {
     mix(mix(mix(seed as u32, (seed >> 32) as u32), x), y)
 }
 
-/// The [`pixel_key`] of each of the pixels in these columns and rows.
+/// The [`pixel_key`]s of the pixels at these columns and rows.
 pub(super) fn pixel_keys(seed: u64, (x, y): (&[u32], &[u32])) -> Vec<u32> {
     let mut keys = vec![0; x.len().min(y.len())];
     Level::best().run(Keys { seed, x, y, keys: &mut keys });
@@ -178,18 +178,18 @@ impl Sum {
     }
 }
 
-/// 1 where nothing of the background shows through a sample.
+/// 1 for a sample through which no background shows, else 0.
 #[inline(always)]
 fn solid(sample: &Sample) -> f32 {
     if sample.through == Vec3::ZERO { 1.0 } else { 0.0 }
 }
 
-/// Adds pixels to `to`, each from as many samples: all of its own.
+/// Resolves pixels of `per_pixel` samples each, and appends them to `to`.
 pub(super) fn resolve_each(samples: &[Sample], per_pixel: usize, background: Option<Vec3>, to: &mut Vec<[f32; 4]>) {
     Level::best().run(Resolve { samples, per_pixel, background, to });
 }
 
-/// The veils of the same pixels.
+/// Appends the veils of the same pixels to `to`.
 pub(super) fn veil_each(samples: &[Sample], per_pixel: usize, background: Option<Vec3>, to: &mut Vec<[f32; 4]>) {
     for samples in samples.chunks(per_pixel.max(1)) {
         let mut sum = Sum::default();

@@ -15,7 +15,7 @@ pub enum Instancing {
     Auto,
     /// Each mesh is stored once.
     Keep,
-    /// Each instance is stored by itself.
+    /// Each instance is stored separately, in world space.
     Flatten,
 }
 

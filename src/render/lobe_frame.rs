@@ -11,13 +11,13 @@ use crate::scene::{TextureRef, UvTransform};
 pub(crate) struct LobeFrame<'a> {
     /// The part of the mesh around the point.
     pub patch: Option<&'a Patch<'a>>,
-    /// Normal before maps turn it, on the side that is seen as a whole.
+    /// Normal before maps turn it, on the side from which the surface as a whole is seen.
     pub smooth: Vec3,
     /// 1 where a mesh's own normal is on that side, else −1.
     pub side: f32,
     /// Normal of the face, on the side that is seen.
     pub geometric: Vec3,
-    /// Normal for shading.
+    /// Shading normal.
     pub normal: Vec3,
     /// Direction back along the ray.
     pub view: Vec3,

@@ -57,7 +57,7 @@ pub struct PrimaryRay {
 const HALF_FOV: (f64, f64) = (1e-4, 1.57);
 
 impl Lens {
-    /// A pinhole with a vertical field of view in radians, brought into the open range 0…π.
+    /// A pinhole with a vertical field of view in radians, clamped to the open range 0…π.
     pub fn perspective(y_fov: f64) -> Self {
         let half = if y_fov.is_finite() { y_fov * 0.5 } else { 0.4 };
         Self::Perspective { half_height: libm::tan(half.clamp(HALF_FOV.0, HALF_FOV.1)) }

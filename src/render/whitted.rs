@@ -55,7 +55,7 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     pub primary_rays: PrimaryRays,
     /// New rays, by class.
     pub(super) starting: [Queue; 3],
-    /// Rays that go on behind a hit, by class.
+    /// Rays that continue behind a hit, by class.
     pub(super) continuing: [Queue; 3],
     wave: Wave,
     /// Media that rays are inside of.

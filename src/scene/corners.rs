@@ -30,7 +30,7 @@ pub(crate) struct Hull {
 }
 
 impl Hull {
-    /// The box of no points.
+    /// Box without points.
     pub(crate) const EMPTY: Self = Self { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY, finite: true };
 }
 

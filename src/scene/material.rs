@@ -277,7 +277,7 @@ impl MetalRough {
         slots
     }
 
-    /// Coefficient of [`Self::absorption`] at which `color` remains of white light after `distance`; zero for distances that are
+    /// Value of `absorption` at which `color` remains of white light after `distance`; zero for distances that are
     /// not positive and finite.
     pub fn absorption_of(color: Vec3, distance: f32) -> Vec3 {
         if !(distance > 0.0 && distance.is_finite()) {

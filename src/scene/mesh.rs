@@ -130,11 +130,11 @@ pub struct Cone {
     pub name: String,
     /// Centre of one end, world space.
     pub base: DVec3,
-    /// Radius there; 0 or more, and not 0 at both ends.
+    /// Radius at `base`; 0 or more, and not 0 at both ends.
     pub base_radius: f64,
     /// Centre of the other end; differs from `base`.
     pub apex: DVec3,
-    /// Radius there.
+    /// Radius at `apex`.
     pub apex_radius: f64,
     /// Index into [`super::Scene::materials`].
     pub material: u32,

@@ -1,4 +1,4 @@
-//! Zip archives: models as they are downloaded.
+//! Zip archives of models, as downloaded.
 
 use super::program::{CUBE, Folder, textured_cube};
 use rawzip::{CompressionMethod, ZipArchiveWriter};

@@ -35,7 +35,7 @@ pub(super) struct Slices {
 }
 
 impl Slices {
-    /// Empty slices of the box of `bounds`.
+    /// Cuts the box of `bounds` into slices, without contents yet.
     pub(super) fn new(bounds: &Bounds) -> Self {
         let width = (bounds.hi - bounds.lo) / SLICES as f64;
         Self {
