@@ -171,8 +171,14 @@ fn flatten(mesh: &mut Mesh) {
         let first = 3 * i as u32;
         *triangle = [first, first + 1, first + 2];
     }
-    let flat = |p: &[Vec3]| [(p[1] - p[0]).cross(p[2] - p[0]).normalize_or(Vec3::Z); 3];
+    let flat = |p: &[Vec3]| [snapped((p[1] - p[0]).cross(p[2] - p[0]).normalize_or(Vec3::Z)); 3];
     mesh.normals = mesh.positions.chunks_exact(3).flat_map(flat).collect();
+}
+
+/// A normal on a lattice: those of faces in one plane differ by rounding, and MikkTSpace averages tangents only of equal ones.
+fn snapped(normal: Vec3) -> Vec3 {
+    const STEPS: f32 = (1 << 21) as f32;
+    (normal * STEPS).round() / STEPS
 }
 
 /// Converts tangents of corners to tangents of vertices, splitting vertices where they differ.
@@ -244,6 +250,20 @@ mod tests {
         assert_eq!(mesh.positions.len(), 6);
         let signs = mesh.triangles.iter().map(|t| t.map(|v| mesh.tangents[v as usize].w));
         assert_eq!(signs.collect::<Vec<_>>(), [[1.0; 3], [-1.0; 3]]);
+    }
+
+    #[test]
+    fn faces_in_one_plane_share_tangents_at_any_scale() {
+        for k in 1..60 {
+            let scale = k as f32 / 26.0;
+            let place = |x: f32, y: f32| Vec3::new(x, y, 0.0) * scale;
+            let positions = vec![place(-1.0, -0.9), place(0.95, -1.0), place(1.0, 0.9), place(-0.9, 1.0)];
+            let uvs = vec![vec![Vec2::Y, Vec2::ONE, Vec2::X, Vec2::new(0.6, 0.3)]];
+            let mut mesh = Mesh { positions, uvs, ..square() };
+            generate(&mut mesh, TexCoords::default());
+            let at = |face: usize, corner: usize| mesh.tangents[mesh.triangles[face][corner] as usize];
+            assert_eq!([at(0, 0), at(0, 2)], [at(1, 0), at(1, 1)], "{scale}");
+        }
     }
 
     #[test]

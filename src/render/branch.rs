@@ -217,7 +217,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let to = above(mirrored, normal);
         if share != Vec3::ZERO && normal.dot(to) > 0.0 {
             let weight = point.path.weight * share * (1.0 / rough.rays as f32);
-            self.send_spread(point, above(to, geometric), (RayClass::Reflected, MIRROR), rough, |path| Path {
+            self.send_spread(point, above(to, geometric), RayClass::Reflected, MIRROR, rough, |path| Path {
                 weight,
                 skips_hotspot: rough.hotspot_sampled.mirrored,
                 ..path.turned(RayClass::Reflected, k + 1)
@@ -254,7 +254,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let media = crossing.beyond;
         let straight = point.path.straight && crossing.n_i == crossing.n_t;
         let turns = crossing.turns();
-        self.send_spread(point, above(to, -geometric), (RayClass::Refracted, turns), rough, |path| Path {
+        self.send_spread(point, above(to, -geometric), RayClass::Refracted, turns, rough, |path| Path {
             weight,
             band,
             media,
@@ -268,7 +268,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         &mut self,
         point: &PathVertex<G>,
         dir: Vec3,
-        (class, turns): (RayClass, f32),
+        class: RayClass,
+        turns: f32,
         rough: &Rough,
         finish: impl FnOnce(Path) -> Path,
     ) {

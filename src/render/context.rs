@@ -204,7 +204,8 @@ impl<'a> Context<'a> {
     /// once.
     pub(super) fn alpha_filter<'r, P: Observer>(
         &'r self,
-        (class, samples): (RayClass, usize),
+        class: RayClass,
+        samples: usize,
         rays: &'r [Ray],
         cones: Cones<'r>,
     ) -> Option<AlphaFilter<'r, 'a>> {

@@ -73,7 +73,7 @@ fn sent(job: &Job, numbers: Range<u32>) -> Coverage {
     let mut hits = vec![Hit::MISS; rays.len()];
     let mut scratch = accel.scratch();
     accel.closest(&rays, &mut hits, &mut scratch, &mut NoProbe);
-    let mut met = only_hits((rays, hits));
+    let mut met = only_hits(rays, hits);
     let (count, mut layers) = (met.0.len(), 1);
     let is_shown =
         |(rays, hits): &(Vec<Ray>, Vec<Hit>)| rays.iter().zip(hits).any(|(ray, hit)| is_there(job, ray, hit));
@@ -81,7 +81,7 @@ fn sent(job: &Job, numbers: Range<u32>) -> Coverage {
     while !shown && !met.0.is_empty() && layers < LAYERS {
         let mut behind = vec![Hit::MISS; met.0.len()];
         accel.next(&met.0, &met.1, &mut behind, &mut scratch, &mut NoProbe);
-        met = only_hits((met.0, behind));
+        met = only_hits(met.0, behind);
         shown = is_shown(&met);
         layers += 1;
     }
@@ -89,7 +89,7 @@ fn sent(job: &Job, numbers: Range<u32>) -> Coverage {
 }
 
 /// Keeps the rays that hit something, with their hits.
-fn only_hits((rays, hits): (Vec<Ray>, Vec<Hit>)) -> (Vec<Ray>, Vec<Hit>) {
+fn only_hits(rays: Vec<Ray>, hits: Vec<Hit>) -> (Vec<Ray>, Vec<Hit>) {
     rays.into_iter().zip(hits).filter(|(_, hit)| hit.is_some()).unzip()
 }
 

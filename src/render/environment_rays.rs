@@ -125,7 +125,8 @@ impl EnvironmentRays {
     /// Traces all rays and passes the light of each point to `arrive` as (sample, light), always in the same order.
     pub(crate) fn trace<A: Accel, P: Observer>(
         &mut self,
-        (context, media): (&Context, &mut MediaTable),
+        context: &Context,
+        media: &mut MediaTable,
         caster: &mut RayCaster<A>,
         probe: &mut P,
         mut arrive: impl FnMut(u32, Vec3),

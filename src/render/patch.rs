@@ -292,7 +292,8 @@ impl Patch<'_> {
         let given = made_for_it.then(|| self.mix(&self.mesh.tangents)).flatten();
         let given = given.and_then(|t| given_tangent(self.placement, t, normal));
         let turn = FrameTurn::new(made_along, map);
-        let along_map = given.map(|frame| turn.map_or(frame, |turn| turn.apply(frame, normal)));
+        let along_map =
+            given.map(|(tangent, sign)| turn.map_or((tangent, sign), |turn| turn.apply(tangent, sign, normal)));
         let (tangent, sign) = along_map.or_else(|| self.tangent_of_coordinates(normal, map))?;
         Some((tangent, normal.cross(tangent) * sign))
     }
@@ -466,7 +467,7 @@ impl FrameTurn {
 
     /// Rotates a tangent, given with the sign of its bitangent, about a normal. v runs down, against the bitangent.
     #[inline(always)]
-    pub(crate) fn apply(&self, (tangent, sign): (Vec3, f32), normal: Vec3) -> (Vec3, f32) {
+    pub(crate) fn apply(&self, tangent: Vec3, sign: f32, normal: Vec3) -> (Vec3, f32) {
         let bitangent = normal.cross(tangent) * sign;
         (tangent * self.along.x - bitangent * self.along.y, sign * self.sign)
     }

@@ -159,14 +159,14 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     pub(super) fn shade_primary_rays(&mut self, primary_rays: &PrimaryRays) {
         let at_a_time = self.context.points_at_a_time;
         for (start, hits) in (0..).step_by(at_a_time).zip(primary_rays.hits.chunks(at_a_time)) {
-            self.shade_some_primary_rays(primary_rays, (start, hits));
+            self.shade_some_primary_rays(primary_rays, start, hits);
             self.relieve();
             self.trace_followers();
         }
     }
 
     /// Shades a run of consecutive hits of eye rays.
-    fn shade_some_primary_rays(&mut self, primary_rays: &PrimaryRays, (first, hits): (u32, &[Hit])) {
+    fn shade_some_primary_rays(&mut self, primary_rays: &PrimaryRays, first: u32, hits: &[Hit]) {
         let context = self.context;
         let mut by_instance = self.sort();
         for (start, eight) in (first..).step_by(LANES).zip(hits.chunks(LANES)) {
@@ -200,14 +200,14 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let mut ranks = std::mem::take(&mut self.buffers.ranks);
         ranks.rank(&wave.rays);
         for rays in ranks.iter().flat_map(|rays| rays.chunks(self.context.points_at_a_time)) {
-            self.shade_some((class, wave), rays);
+            self.shade_some(class, wave, rays);
             self.relieve();
         }
         self.buffers.ranks = ranks;
     }
 
     /// Shades the hits of these rays of a wave, which belong to different samples.
-    fn shade_some(&mut self, (class, wave): (RayClass, &Wave), rays: &[u32]) {
+    fn shade_some(&mut self, class: RayClass, wave: &Wave, rays: &[u32]) {
         let context = self.context;
         let traced = TracedRays::Wave(class, wave);
         let mut by_instance = self.sort();
@@ -292,7 +292,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
                 if hits.len() < FEW {
                     hits.iter().for_each(|&(ray, _)| self.shade_one(traced, ray as usize));
                 } else {
-                    self.shade_batch(traced, &by_instance, (instance, hits), &mut batch);
+                    self.shade_batch(traced, &by_instance, instance, hits, &mut batch);
                 }
             }
         }
@@ -305,7 +305,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         &mut self,
         traced: TracedRays,
         by_instance: &HitsByInstance,
-        (instance, hits): (u32, &[(u32, u32)]),
+        instance: u32,
+        hits: &[(u32, u32)],
         batch: &mut ShadingBatch,
     ) {
         let context = self.context;
@@ -338,7 +339,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if batch.is_empty() {
             return;
         }
-        self.note_batch(traced, (instance, bsdf), batch);
+        self.note_batch(traced, instance, bsdf, batch);
         batch.complete(context, traced, PlacedMesh { mesh, placement }, constants);
         batch.overlay(context, traced, PlacedMesh { mesh, placement }, constants);
         if !constants.glass.is_some_and(|glass| glass.is_dark_inside && batch.sees_backs_alone()) {
@@ -378,7 +379,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     /// Records the first surfaces of samples among points of an instance, whose material without maps is `unmapped`.
-    fn note_batch(&mut self, traced: TracedRays, (instance, unmapped): (u32, &Bsdf), batch: &ShadingBatch) {
+    fn note_batch(&mut self, traced: TracedRays, instance: u32, unmapped: &Bsdf, batch: &ShadingBatch) {
         if self.firsts.is_empty() {
             return;
         }
@@ -406,8 +407,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         for (number, light) in (0..).zip(&context.lights) {
             if !light.is_area() {
                 batch.shade_light(constants, light, None);
-                self.choose(traced, (light, number), batch);
-                self.ask_for(traced, light, batch, (within, None));
+                self.choose(traced, light, number, batch);
+                self.ask_for(traced, light, batch, within, None);
                 continue;
             }
             if draws.is_empty() {
@@ -415,15 +416,15 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             }
             for place in 0..batch.draw(draws.iter_mut().map(|(i, draws, rays)| (*i, draws.spread(*rays), *rays))) {
                 batch.shade_light(constants, light, Some(place));
-                self.choose(traced, (light, mix(number, place + 1)), batch);
-                self.ask_for(traced, light, batch, (within, Some(place)));
+                self.choose(traced, light, mix(number, place + 1), batch);
+                self.ask_for(traced, light, batch, within, Some(place));
             }
         }
         self.buffers.draws = draws;
     }
 
     /// Drops points that a light hardly reaches, at random.
-    fn choose(&self, traced: TracedRays, (light, number): (&LocalLight, u32), batch: &mut ShadingBatch) {
+    fn choose(&self, traced: TracedRays, light: &LocalLight, number: u32, batch: &mut ShadingBatch) {
         if !(light.shadows && self.chooses_shadow_rays()) {
             return;
         }
@@ -447,7 +448,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         traced: TracedRays,
         light: &LocalLight,
         batch: &ShadingBatch,
-        (within, place): (bool, Option<u32>),
+        within: bool,
+        place: Option<u32>,
     ) {
         let context = self.context;
         let absorbs = context.absorption.is_some();
@@ -463,7 +465,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let at = batch.arrival(i).0;
             let (ray, hit) = (&traced.rays()[at], &traced.hits()[at]);
             let drawn = place.map(|place| batch.drawn(i, place));
-            if let Some(shadow_rays) = shadow_rays(context, (light, drawn), ray, hit) {
+            if let Some(shadow_rays) = shadow_rays(context, light, drawn, ray, hit) {
                 let media = absorbs.then(|| traced.path(at).media);
                 self.shadows.push_pair(&shadow_rays, radiance, media);
             }
@@ -504,7 +506,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
 /// Shadow rays from the round surface at `hit` to a light, or to one point of it if that was drawn.
 fn shadow_rays(
     context: &Context,
-    (light, drawn): (&LocalLight, Option<[f32; 2]>),
+    light: &LocalLight,
+    drawn: Option<[f32; 2]>,
     ray: &Ray,
     hit: &Hit,
 ) -> Option<ShadowRays> {

@@ -170,8 +170,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let mut primary_rays = std::mem::take(&mut self.primary_rays);
         {
             let PrimaryQuery { rays, pencil, cones, hits } = primary_rays.ask();
-            let of = (RayClass::Primary, self.samples.len());
-            let alpha_filter = self.context.alpha_filter::<P>(of, rays, Cones::PrimaryRays(cones));
+            let (class, samples) = (RayClass::Primary, self.samples.len());
+            let alpha_filter = self.context.alpha_filter::<P>(class, samples, rays, Cones::PrimaryRays(cones));
             let filter = alpha_filter.as_ref().map(|filter| filter as &dyn IntersectFilter);
             let queries = HitQueries { rays, pencil: pencil.as_ref(), after: None, filter };
             self.caster.first_hits(&queries, hits, self.counts.of(RayClass::Primary));
@@ -188,7 +188,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let class = self.take_wave()?;
         let wave = &mut self.wave;
         let mut hits = std::mem::take(&mut wave.hits);
-        let alpha_filter = self.context.alpha_filter::<P>((class, self.samples.len()), &wave.rays, (&*wave).into());
+        let alpha_filter = self.context.alpha_filter::<P>(class, self.samples.len(), &wave.rays, (&*wave).into());
         let filter = alpha_filter.as_ref().map(|filter| filter as &dyn IntersectFilter);
         let after = (!wave.starts).then_some(wave.after.as_slice());
         let queries = HitQueries { rays: &wave.rays, pencil: None, after, filter };
@@ -223,7 +223,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if self.hotspots.len() > 0 {
             self.hotspots.trace(self.context, &mut self.media, &mut self.caster, &mut self.counts.shadow, &mut arrive);
         }
-        self.environment_rays.trace((self.context, &mut self.media), &mut self.caster, &mut self.counts.shadow, arrive);
+        self.environment_rays.trace(self.context, &mut self.media, &mut self.caster, &mut self.counts.shadow, arrive);
     }
 
     /// Traces shadow rays once many are queued. Between two calls each sample is shaded at one point at most, so that the order
@@ -373,7 +373,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         for (number, light) in (0..).zip(&context.lights) {
             if !light.is_area() {
                 if let Some(incident) = light.incident(position) {
-                    self.shade_light(point, crossing, (light, number), &incident, 1.0);
+                    self.shade_light(point, crossing, light, number, &incident, 1.0);
                 }
                 continue;
             }
@@ -381,7 +381,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             let spread = draws.get_or_insert_with(|| self.draws(point, Purpose::Lights)).spread(rays);
             for k in 0..rays {
                 if let Some(incident) = light.incident_from(position, spread.point(k)) {
-                    self.shade_light(point, crossing, (light, mix(number, k + 1)), &incident, 1.0 / rays as f32);
+                    self.shade_light(point, crossing, light, mix(number, k + 1), &incident, 1.0 / rays as f32);
                 }
             }
         }
@@ -393,7 +393,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         &mut self,
         point: &PathVertex<Surface>,
         crossing: &Crossing,
-        (light, number): (&LocalLight, u32),
+        light: &LocalLight,
+        number: u32,
         incident: &Incident,
         part: f32,
     ) {

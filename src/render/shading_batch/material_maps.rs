@@ -545,7 +545,7 @@ impl Turns {
             let own = given.faces.outward(i);
             let tangent = given_tangent(placement, given.mix(i, given.faces.tangents(i)), own);
             let (tangent, sign) = tangent.unwrap_or((Vec3::NAN, 1.0));
-            let (tangent, sign) = turn.map_or((tangent, sign), |turn| turn.apply((tangent, sign), own));
+            let (tangent, sign) = turn.map_or((tangent, sign), |turn| turn.apply(tangent, sign, own));
             put(&mut self.own, i, own);
             put(&mut self.tangent, i, tangent);
             put(&mut self.bitangent, i, own.cross(tangent) * sign);

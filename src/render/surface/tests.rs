@@ -115,6 +115,25 @@ fn given_tangents_are_used_with_their_handedness() {
 }
 
 #[test]
+fn a_normal_map_is_decoded_in_the_frame_that_it_was_baked_in() {
+    let texel = Vec3::new(0.3, 0.5, 0.8);
+    let mut scene = with_normal_map(texel.x, texel.y, texel.z);
+    // Corners of a box that is smoothed over its edges.
+    let normals = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| Vec3::new(x, y, 1.0).normalize());
+    let tangents = normals.map(|n| (Vec3::X - n * n.x).normalize());
+    for (sign, mirror) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0)] {
+        scene.meshes[0].normals = normals.to_vec();
+        scene.meshes[0].tangents = tangents.iter().map(|t| t.extend(sign)).collect();
+        scene.instances[0].world_from_object = DAffine3::from_scale(DVec3::new(mirror, 1.0, 1.0));
+        // The point is a quarter of the way to the second and to the third corner.
+        let mix = |of: &[Vec3; 4]| of[0] * 0.5 + of[1] * 0.25 + of[2] * 0.25;
+        let (n, t) = (mix(&normals), mix(&tangents));
+        let turned = t * texel.x + n.cross(t) * sign * texel.y + n * texel.z;
+        assert_near(normal(&scene, 1.0), turned.normalize() * Vec3::new(mirror as f32, 1.0, 1.0));
+    }
+}
+
+#[test]
 fn the_transform_of_a_normal_map_turns_its_frame_as_transformed_coordinates_do() {
     let turned = |scale: [f32; 2], rotation| UvTransform { offset: Vec2::ZERO, scale: scale.into(), rotation };
     let quarter = std::f32::consts::FRAC_PI_2;

@@ -74,7 +74,7 @@ fn of_faces(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
     }
     let crowd = Crowd::of(scene);
     let slices = Slices::of(scene, &crowd, &bounds);
-    (slices.parts() == faces(scene)).then(|| without_strays((scene, &crowd), bounds, slices))
+    (slices.parts() == faces(scene)).then(|| without_strays(scene, &crowd, bounds, slices))
 }
 
 /// Box of the model of any scene, found part by part.
@@ -86,11 +86,11 @@ fn by_parts(scene: &Scene) -> Bounds {
     let bounds = Bounds { lo: whole.0, hi: whole.1, strays: 0, whole };
     let crowd = Crowd::of(scene);
     let slices = Slices::of(scene, &crowd, &bounds);
-    without_strays((scene, &crowd), bounds, slices)
+    without_strays(scene, &crowd, bounds, slices)
 }
 
 /// Removes strays until nothing more comes off; `slices` hold all parts in `bounds`.
-fn without_strays((scene, crowd): (&Scene, &Crowd), mut bounds: Bounds, mut slices: Slices) -> Bounds {
+fn without_strays(scene: &Scene, crowd: &Crowd, mut bounds: Bounds, mut slices: Slices) -> Bounds {
     // Each round zooms in by up to SLICES; the range of f64 needs far fewer than this many.
     for _ in 0..128 {
         if slices.has_no_gap() {
@@ -115,9 +115,9 @@ fn without_strays((scene, crowd): (&Scene, &Crowd), mut bounds: Bounds, mut slic
         1 => !bounds.contains(part.lo) || !bounds.contains(part.hi),
         _ => !bounds.contains(part.center),
     };
-    let parts = (scene, Granularity::Crowd(crowd, &bounds));
+    let granularity = Granularity::Crowd(crowd, &bounds);
     let add = |n: &mut u64, part: &Part| *n += if outside(part) { part.faces } else { 0 };
-    bounds.strays = gather(parts, || 0, add, |n, more| *n += more);
+    bounds.strays = gather(scene, granularity, || 0, add, |n, more| *n += more);
     if !crowd.is_empty() {
         (bounds.lo, bounds.hi) = tight(scene, bounds);
     }
@@ -333,7 +333,7 @@ mod tests {
             let found = robust_bounds(&scene);
             let whole = Bounds { lo: found.whole.0, hi: found.whole.1, strays: 0, whole: found.whole };
             let by_faces = Crowd::of(&Scene::default());
-            let slow = without_strays((&scene, &by_faces), whole, Slices::of(&scene, &by_faces, &whole));
+            let slow = without_strays(&scene, &by_faces, whole, Slices::of(&scene, &by_faces, &whole));
             assert_eq!(found, slow, "{far}");
             assert!(!Crowd::of(&scene).is_empty() && (found.strays > 0) == (far > 0.0), "{far}");
         }
@@ -413,7 +413,7 @@ mod tests {
     #[test]
     fn every_face_counts_once_whoever_counts_it() {
         for faces in [40, CHUNK, CHUNK + 1, 3 * CHUNK + 5] {
-            let counted = gather((&spiral(faces, 0.0), Granularity::Faces), || 0, |n, _| *n += 1, |n, more| *n += more);
+            let counted = gather(&spiral(faces, 0.0), Granularity::Faces, || 0, |n, _| *n += 1, |n, more| *n += more);
             assert_eq!(counted, 2 * faces, "two instances");
         }
     }

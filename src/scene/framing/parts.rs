@@ -54,7 +54,7 @@ impl Facing {
     pub(super) fn of(mesh: &Mesh, world_from_object: &DAffine3) -> Self {
         let mut all = Self::default();
         let add = |all: &mut Self, part: &Part| all.join(Self { normal: part.normal, area: part.area });
-        gather_faces((mesh, world_from_object), &mut all, &Self::default, &add, &Self::join);
+        gather_faces(mesh, world_from_object, &mut all, &Self::default, &add, &Self::join);
         all
     }
 
@@ -111,7 +111,7 @@ pub(super) fn hull(
             join(all, (part.lo, part.hi));
         }
     };
-    let (lo, hi) = gather((scene, granularity), nothing, add, join);
+    let (lo, hi) = gather(scene, granularity, nothing, add, join);
     lo.cmple(hi).all().then_some((lo, hi))
 }
 
@@ -120,7 +120,8 @@ pub(super) const CHUNK: usize = 1 << 15;
 
 /// Sums over every face, sphere and cone with finite corners, starting from `nothing`; `join` combines partial sums.
 pub(super) fn gather<T: Send>(
-    (scene, granularity): (&Scene, Granularity),
+    scene: &Scene,
+    granularity: Granularity,
     nothing: impl Fn() -> T + Sync,
     add: impl Fn(&mut T, &Part) + Sync,
     join: impl Fn(&mut T, T),
@@ -134,7 +135,7 @@ pub(super) fn gather<T: Send>(
             add(&mut all, &part);
             continue;
         }
-        gather_faces((mesh, &instance.world_from_object), &mut all, &nothing, &add, &join);
+        gather_faces(mesh, &instance.world_from_object, &mut all, &nothing, &add, &join);
     }
     solids(scene).for_each(|part| add(&mut all, &part));
     all
@@ -142,7 +143,8 @@ pub(super) fn gather<T: Send>(
 
 /// Adds the faces of a placed mesh to `all` in the same way.
 fn gather_faces<T: Send>(
-    (mesh, world_from_object): (&Mesh, &DAffine3),
+    mesh: &Mesh,
+    world_from_object: &DAffine3,
     all: &mut T,
     nothing: &(impl Fn() -> T + Sync),
     add: &(impl Fn(&mut T, &Part) + Sync),

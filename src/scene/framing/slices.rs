@@ -56,7 +56,7 @@ impl Slices {
                 slices.weigh(part);
             }
         };
-        gather((scene, Granularity::Crowd(crowd, bounds)), || Self::new(bounds), add, Self::join)
+        gather(scene, Granularity::Crowd(crowd, bounds), || Self::new(bounds), add, Self::join)
     }
 
     /// Adds the contents of other slices of the same box.
@@ -179,8 +179,8 @@ impl Slices {
         let size = (0..3).map(|axis| self.size(axis)).fold(0.0, f64::max);
         let covered = self.reached.covered();
         let kept = [0, 1, 2].map(|axis| {
-            let last = SLICES - 1 - self.cut(axis, (size, &covered[axis]), |i| SLICES - 1 - i);
-            (self.cut(axis, (size, &covered[axis]), |i| i), last)
+            let last = SLICES - 1 - self.cut(axis, size, &covered[axis], |i| SLICES - 1 - i);
+            (self.cut(axis, size, &covered[axis], |i| i), last)
         });
         (kept != [(0, SLICES - 1); 3]).then_some(kept)
     }
@@ -206,7 +206,7 @@ impl Slices {
     }
 
     /// Number of slices that come off one end of `axis`; `from_end` maps indices counted from that end.
-    fn cut(&self, axis: usize, (size, covered): (f64, &[bool; SLICES]), from_end: impl Fn(usize) -> usize) -> usize {
+    fn cut(&self, axis: usize, size: f64, covered: &[bool; SLICES], from_end: impl Fn(usize) -> usize) -> usize {
         let total_area: f64 = self.area[axis].iter().sum();
         let total_count: u64 = self.count[axis].iter().sum();
         let (mut area, mut count, mut gap, mut cut) = (0.0, 0, 0usize, 0);
