@@ -201,8 +201,8 @@ impl<P: Fn(u32) -> DVec3 + Sync> Faces<'_, P> {
     /// Visits polygons as fans of triangles around their first corners.
     fn visit_polygons(&self, mut f: impl FnMut(&Part)) {
         for polygon in &self.mesh.polygons {
-            let run = polygon.first as usize..(polygon.first + polygon.len) as usize;
-            let corners = self.mesh.polygon_corners.get(run).unwrap_or_default();
+            let first = polygon.first as usize;
+            let corners = self.mesh.polygon_corners.get(first..first + polygon.len as usize).unwrap_or_default();
             for pair in corners.windows(2).skip(1) {
                 Part::face([corners[0], pair[0], pair[1]].map(&self.place)).iter().for_each(&mut f);
             }
