@@ -15,7 +15,7 @@ impl Scene {
     /// Adds all of `part`, placed by `world_from_part`; a part whose up axis differs is turned upright first.
     ///
     /// Ambient light, environment, background and hints remain those of this scene. Indices of `part` are shifted; those of this
-    /// scene stay valid. Radii of spheres and cones scale by the mean of the scale factors.
+    /// scene stay valid. Radii of spheres and cones scale by the cube root of the determinant.
     pub fn append(&mut self, mut part: Self, world_from_part: &DAffine3) -> Stored {
         let stored = self.store(&mut part);
         self.place(part, stored, world_from_part);
