@@ -23,8 +23,9 @@ const CHUNK: usize = 1 << 16;
 /// Maximum length of the stored text: a JPEG cannot hold many times as much.
 const MOST: usize = 1 << 15;
 
-/// Text stored in a picture about what it was made of: `asked`, the hash of each file under `files`, and whether there were
-/// `gaps`, files that were looked for but missing; `None` if a file has no name, and with hundreds of files.
+/// Text stored in a picture about what it was made of: under `asked` the hash of the request, under `files` that of each file,
+/// and whether there were `gaps`, files that were looked for but missing; `None` for standard input, for a path that is not
+/// UTF-8, and with hundreds of files.
 pub(super) fn made_of(job: &RenderJob, batch: &Batch, shot: &Shot, loaded: &Loaded) -> Option<String> {
     if batch.inputs.iter().any(|input| input == Path::new("-")) {
         return None;

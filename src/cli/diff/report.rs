@@ -145,7 +145,7 @@ fn decibels(psnr: f64) -> String {
     }
 }
 
-/// Formats a number with four significant digits, as small errors need them.
+/// Formats a number with five decimals, or, if it is small or large, in scientific notation with four digits.
 fn figure(x: f64) -> String {
     match x {
         0.0 => "0".into(),

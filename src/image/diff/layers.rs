@@ -8,8 +8,8 @@ use crate::image::Layers;
 pub struct LayerDifference {
     /// Name in the file, such as `albedo`, `Z` or `id.prim`.
     pub name: String,
-    /// Root mean squared difference, over the pairs of values that are not finite in just one picture (a depth of a surface that
-    /// only one shows is left out). Ids, such as `id.prim`, that differ count 1.
+    /// Root mean squared difference, without the pairs of which just one value is finite (such as the depth where only one
+    /// picture shows a surface). Ids, such as `id.prim`, that differ count 1.
     pub rmse: f64,
     /// Largest difference; infinite where just one of two values is finite.
     pub max: f64,

@@ -60,7 +60,7 @@ pub(in crate::load) enum Coding {
 /// Normalizes colours to 0…1, and to white where they are not finite. A fourth channel, the opacity, is scaled like the
 /// colours where any opacity is above 1, and else taken as 0…1.
 pub(in crate::load) fn settle<const N: usize>(colors: &mut [[f32; N]]) -> Coding {
-    /// Amount that rounding may exceed full light by.
+    /// Excess over full light, or below 0, that counts as rounding.
     const ROUNDED: f32 = 1e-3;
     let (bytes, mut beyond) = (are_bytes(colors), false);
     let unit = |bytes: bool| if bytes { 255.0 } else { 1.0 };

@@ -188,7 +188,7 @@ impl Pictures {
         self.pair([rough, metal], texel, |texels| Pixels::Rgba8(texels.into()))
     }
 
-    /// Uses 16 bits so that an angle of 0 stays exact.
+    /// Uses 16 bits, as 8 bits cannot store the middle of their range and would turn an angle of 0 by 0.2°.
     fn anisotropy(&self, strength: Option<(usize, Channel)>, turn: Option<(usize, Channel)>, most: f64) -> Bitmap {
         #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
         let texel = |[strength, turn]: [Option<f32>; 2]| {

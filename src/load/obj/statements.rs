@@ -109,7 +109,7 @@ fn read_in_runs(text: &[u8], run: usize, file: &Path, budget: &mut Budget) -> Re
     Ok(statements)
 }
 
-/// Bytes of a point: its vertex, and the numbers of the two ends of a line.
+/// Bytes of a point: its vertex, and the two ends of the line without length that it is stored as.
 const POINT: u64 = 48;
 
 impl Statements {

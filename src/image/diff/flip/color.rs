@@ -44,7 +44,7 @@ pub(super) fn perceived(picture: Displayed, pixels_per_degree: f64) -> Vec<Seen>
     blurred.into_par_iter().map(|[y, cx, a, b]| hunt(lab(displayed([y, cx, first * a + second * b])))).collect()
 }
 
-/// Difference of two colours, 0..=1; `most` is [`most`].
+/// Difference of two colours, 0..=1; `most` is [`largest_difference`].
 pub(super) fn difference(a: Seen, b: Seen, most: f32) -> f32 {
     let d = libm::powf(distance(a, b), POWER);
     let knee = KNEE * most;

@@ -59,7 +59,7 @@ enum Target {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Numbers {
     Floats,
-    /// Floats, or normalised integers.
+    /// Floats, or normalised integers of up to 16 bits.
     Units,
     /// Floats and all integers.
     All,

@@ -144,7 +144,7 @@ fn integers_stand_for_themselves_unless_they_are_normalized() {
     }
 }
 
-/// Animates the visibility of a node: hidden before 1 s.
+/// Animates the visibility of node 1, with its camera, or of node 2, with its light: hidden before 1 s.
 fn switching(node: usize, interpolation: &str, normalized: bool) -> Pointing {
     let mut file = Pointing::new();
     file.file.root["nodes"][1]["extensions"] = json!({"KHR_node_visibility": {}});
