@@ -55,7 +55,7 @@ pub(super) fn read(source: &Source, mut making: Making) -> Result<PlainMesh, Dia
         making.take_colors(records.len())?;
         records.par_iter().map(|record| paint.color(attributes(record))).collect_into_vec(&mut colors);
     }
-    // Positions were single precision, so that compares them exactly.
+    // Positions come from single precision, so converting them back is exact.
     let bits = |place: DVec3| place.as_vec3().to_array().map(f32::to_bits);
     let mut bare = making.triangles(3 * records.len(), |corner| place(records, corner), bits, colors)?;
     if uncounted {
