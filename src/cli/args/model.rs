@@ -39,8 +39,8 @@ pub(in crate::cli) struct LoadArgs {
     /// How to treat OBJ, PLY and NFF faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub polygons: PolygonsArg,
-    /// Give meshes without normals smooth ones, except at edges where faces meet at more than so many degrees, 30 unless
-    /// given
+    /// Give meshes without normals smooth ones, except at edges where normals of faces differ by more than so many degrees,
+    /// 30 unless given
     #[arg(long, value_name = "DEGREES", value_parser = parse::lean, num_args = 0..=1, require_equals = true,
           default_missing_value = "30", help_heading = "Loading", hide_short_help = true)]
     pub smooth: Option<f64>,

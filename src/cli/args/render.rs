@@ -35,8 +35,8 @@ pub(in crate::cli) struct RenderArgs {
     /// Default: STEM.png in the current folder. Models found below an input folder get the same subfolders for their
     /// pictures: {sub} is the path from the input folder to the model's own (without the extension of an archive). A folder
     /// given here is created, and so are those of a template with fields other than {dir}, if the folder they start from
-    /// exists. A name typed here replaces any file; names that meshray makes up (in a folder given here, of heat maps, or of
-    /// a template that writes beside a model) replace only pictures that meshray wrote.
+    /// exists. A name typed here replaces any file; names that meshray makes up (STEM.png, in a folder given here, of heat
+    /// maps, or of a template that writes beside a model) replace only pictures that meshray wrote.
     #[arg(short, long, value_name = "PATH", help_heading = "Output", allow_hyphen_values = true)]
     pub output: Option<String>,
     /// Columns and rows of the picture; one number is a square [default: 1024x768]
@@ -137,12 +137,12 @@ pub(in crate::cli) struct RenderArgs {
     /// Surroundings that light the scene: an equirectangular picture (.hdr, .exr, or an ordinary one), or studio, white,
     /// black
     ///
-    /// In black, mirrors and glass see the --background where that is a colour, else dark grey. A model without lamps keeps
-    /// its default lamps in the studio; any other surroundings replace them. Lamps of the file keep shining. The middle of a
-    /// picture lies along +X, a quarter to the right of it +Z, its upper edge overhead.
+    /// Black gives no light, but mirrors and glass see the --background in it where that is a colour (dark grey if none is
+    /// given). A model without lamps keeps its default lamps in the studio; any other surroundings replace them. Lamps of the
+    /// file keep shining. The middle of a picture lies along +X, a quarter to the right of it +Z, its upper edge overhead.
     #[arg(long, value_name = "FILE|NAME", value_parser = parse::env, help_heading = "Light and background")]
     pub env: Option<parse::Env>,
-    /// Turn the surroundings about the up axis
+    /// Turn the picture given to --env about the up axis
     #[arg(long, value_name = "DEGREES", value_parser = parse::degrees, requires = "env", allow_hyphen_values = true,
           help_heading = "Light and background", hide_short_help = true)]
     pub env_rotate: Option<f64>,
@@ -233,8 +233,8 @@ pub(in crate::cli) struct RenderArgs {
     /// Print times and counts: a timed run, then a counted one
     #[arg(long, value_name = "FORMAT", value_enum, help_heading = "Run")]
     pub stats: Option<StatsFormat>,
-    /// Render no picture: forecast time, rays, tests, memory and error, each with an interval, from about a hundredth of the
-    /// pixels
+    /// Render no picture: forecast time, rays, tests and error, each with an interval, and memory, from about a hundredth of
+    /// the pixels
     #[arg(long, help_heading = "Run", hide_short_help = true, conflicts_with_all = [
         "again", "heatmap", "profile", "keep_partial"])]
     pub dry_run: bool,

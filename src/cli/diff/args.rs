@@ -34,8 +34,8 @@ pub(in crate::cli) struct DiffArgs {
     #[arg(long, value_name = "N", value_parser = parse::pixels_per_degree, default_value_t = (PIXELS_PER_DEGREE * 100.0).round() / 100.0,
           help_heading = "Comparison")]
     pub pixels_per_degree: f64,
-    /// Exit with code 1 when a figure exceeds a limit, such as 'rmse>0.01,flip>0.05,psnr<40'; 'bias<-0.01,bias>0.01': when it
-    /// is darker or brighter than that; 'layer-max>0': when a layer of two EXR files differs, or only one of them has it
+    /// Exit with code 1 when a figure is beyond a limit, such as 'rmse>0.01,flip>0.05,psnr<40'; 'bias<-0.01,bias>0.01': when
+    /// it is darker or brighter than that; 'layer-max>0': when a layer of two EXR files differs, or only one of them has it
     #[arg(long, value_name = "LIMIT", value_delimiter = ',', help_heading = "Comparison")]
     pub fail_if: Vec<Limit>,
 
