@@ -133,7 +133,7 @@ pub enum Outcome {
     LeftOut,
     /// The prim is hit, but outside the query's range.
     OutOfRange,
-    /// The prim is hit in an occlusion query, but lets light through there, or may do so in part.
+    /// The prim is hit where it lets light through, or may do so in part, and the hit does not count for the query.
     LetThrough,
     /// The prim is hit, but an earlier hit is known.
     Farther,

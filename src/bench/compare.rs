@@ -34,7 +34,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Takes about half a minute for a mesh of a hundred thousand triangles.
+    /// Default of [`Self::passes`]: takes about half a minute for a mesh of a hundred thousand triangles.
     pub const PASSES: usize = 5;
     /// Default of [`Self::rays`].
     pub const RAYS: usize = 200_000;

@@ -6,7 +6,7 @@ use crate::math::random::Random;
 use crate::render::{Asked, CLASS_NAMES, Job, Question, Tape, World, render_recorded};
 use std::f32::consts::TAU;
 
-/// Origin of a ray.
+/// Source of a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Class {
     /// Camera ray.

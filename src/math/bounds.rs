@@ -213,7 +213,7 @@ pub const PARALLEL: f32 = 1.0 / (1u32 << 30) as f32;
 
 /// Largest size of E + |o| and of a direction (sums of the sizes of components), and the reciprocal of the smallest, for
 /// which these bounds hold: reciprocals are then below 2⁶⁸ and their products below 2¹⁰⁵, edge values and heights below 2¹¹⁶,
-/// and the pad over a direction's component, of which [`PARALLEL`] alone adds as much, is above 2⁻¹⁰³.
+/// and the pad over a direction's component is above 2⁻¹⁰³ by what [`PARALLEL`] adds to it alone.
 pub const BOX_RANGE: f32 = (1u64 << 36) as f32;
 
 /// [`BOX_PAD`] for a ray transformed into the frame of an object: its origin and direction are rounded there, which adds u

@@ -25,7 +25,7 @@ pub fn snapped_center(lo: DVec3, hi: DVec3) -> DVec3 {
     }
 }
 
-/// Number of points sampled to find where most of a model lies.
+/// Largest number of points sampled to find where most of a model lies.
 const SAMPLE: usize = 1 << 10;
 
 /// Largest ratio of a box to the extent of half of its points for which the box is centred on its own middle: rounding to

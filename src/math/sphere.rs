@@ -92,7 +92,7 @@ fn solve<R: Real>(ray: &RaySpace, center: Vec3, radius: f32, ahead: bool) -> Fou
         return Found::Nothing;
     }
 
-    // From the centre to the nearest point of the line: the quotient errs by 8 u |f|/|d|, the rest by a few u |f|.
+    // From the line's point nearest to the centre, to the centre: the quotient errs by 8 u |f|/|d|, the rest by a few u |f|.
     let nearest = f.minus(d.times(b / length2));
     let past2 = nearest.dot(nearest);
     let discriminant = r2 - past2;

@@ -120,7 +120,7 @@ mod tests {
                 let (a, b, origin) =
                     (random.cube() * 0.1, random.cube() * 0.1 + Vec3::X, random.cube() + Vec3::Z * 4.0);
                 let (c, d) = (Vec3::new(0.5, 1.0, random.unit()), Vec3::new(0.5, -1.0, random.unit()));
-                // Exactly through the edge shared by both triangles.
+                // Through the edge shared by both triangles, up to rounding.
                 let target = a + (b - a) * (0.25 + 0.5 * random.unit());
                 let Some(ray) = RaySpace::new(origin, target - origin) else { continue };
                 let shear = Shear::<f32>::new(&ray);

@@ -125,7 +125,8 @@ impl Tree {
         size_of_val(&*self.nodes) + size_of_val(&*self.prims)
     }
 
-    /// Calls `found` with each node of the subtree below `node`, itself included, and its depth in the tree.
+    /// Calls `found` with each node of the subtree below `node`, itself included, and its depth, which is
+    /// `depth` for `node`.
     pub fn each<'t>(&'t self, node: u32, depth: u32, found: &mut impl FnMut(u32, u32, Below<'t>)) {
         let below = self.below(node);
         found(node, depth, below);

@@ -29,7 +29,7 @@ fn some_cones() -> Vec<Cone> {
         let apex_radius = [base_radius, 0.0, 0.3 * base_radius][i % 3];
         cones.push(Cone { base: r.cube(), base_radius, apex: r.cube() * 3.0, apex_radius });
     }
-    // Wide cones whose mantle passes near the origin of the frame: intermediate rounding errors exceed the position itself.
+    // Wide cones whose mantle passes near the origin of the frame: the numbers rounded in between are larger than the position.
     for i in 0..20 {
         let side = r.cube().normalize_or(Vec3::X);
         let (along, across) = side.any_orthonormal_pair();

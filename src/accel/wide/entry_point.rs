@@ -173,7 +173,7 @@ impl Directions {
         if !fit || !range.contains(&least.element_sum()) || !range.contains(&greatest.element_sum()) {
             return None;
         }
-        // Components nearly perpendicular to the main axis are raised to this fraction of the largest, as in `Padding`.
+        // Smaller components are raised to this fraction of the largest, as in `Padding`.
         let slow = least.max(Vec3::splat(least.max_element() * PARALLEL));
         let fast = greatest.max(Vec3::splat(greatest.max_element() * PARALLEL));
         let (from, to) = (1.0 / fast, 1.0 / slow);

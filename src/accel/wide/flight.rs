@@ -24,7 +24,7 @@ const SLOTS: usize = 32;
 /// Fewest rays at leaves that are worth a pass over the leaves.
 const LEAVES: u32 = 16;
 
-/// Largest stack that a tree may need to be traced in flight; deeper trees are traced in another way.
+/// Entries of a ray's stack: trees that may need as many or more are traced in another way.
 pub(super) const DEPTH: usize = 128;
 
 /// By octant and lane mask: the lanes in the mask, the farthest first as seen from that octant.

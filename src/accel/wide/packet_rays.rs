@@ -108,7 +108,8 @@ impl<B: BoxMargins, const N: usize> PacketRays<B, N> {
     }
 
     /// Computes slabs and ranges, and returns a mask of the rays that run like the first one: with the same octant and main
-    /// axis, with numbers for which the bounds of padded boxes hold, and not with a negative range.
+    /// axis, with numbers for which the bounds of padded boxes hold, and with a range that is not empty
+    /// and does not begin behind the origin.
     #[inline(always)]
     pub(super) fn prepare<T: Lanewise<N>>(&mut self, s: T, tree: &Tree, t_max: &[f32; N]) -> u32 {
         let (t_min, t_max, zero) = (s.load(&self.t_min), s.load(t_max), s.splat(0.0));

@@ -4,7 +4,7 @@
 
 use robust::{Coord, orient2d};
 
-/// Corners that are not convex, in a binary tree of boxes.
+/// Corners that were not convex when the ring was linked, in a binary tree of boxes; some may be convex or cut off since.
 #[derive(Debug, Default)]
 pub(super) struct Blockers {
     /// Corners in the order of the leaves.

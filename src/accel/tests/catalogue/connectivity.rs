@@ -170,7 +170,7 @@ fn rays_along_the_axes_through_corners_of_an_integer_mesh_miss_nothing() {
         }
     }
     let hits = assert_exact("integers", &shapes, &rays, 0.501);
-    // All but the corners that only touch an outline of triangles seen edge-on.
+    // All but the rays that only touch an outline whose triangles are seen edge-on.
     assert!(hits > rays.len() * 9 / 10, "{hits} of {}", rays.len());
 }
 

@@ -19,9 +19,9 @@ const SMALL_PART: usize = 4;
 /// Up to this many prims are split by area alone, whatever the splitting.
 pub(in crate::accel) const ALIKE: usize = *SMALL_CELL.start();
 
-/// A leaf whose box exceeds this fraction of the root's area is hit by many rays. It is split if its halves have less than
-/// `WORTH_CUTTING` of its area, or less than `FLAT` of its volume: rays that start near a floor start in a box that is less
-/// flat.
+/// A leaf whose box exceeds this fraction of the root's area is hit by many rays. It is split if its halves together
+/// have less than `WORTH_CUTTING` of its area, or less than `FLAT` of its volume: rays that start near a floor start in a box
+/// that is less flat.
 const LARGE_LEAF: f32 = 1.0 / 2048.0;
 const WORTH_CUTTING: f32 = 0.8;
 const FLAT: f32 = 0.1;

@@ -81,7 +81,7 @@ impl Scale {
         }
     }
 
-    /// Values at distance `step` from the first integer on the scale.
+    /// Values at intervals of `step`, from the first integer on the scale.
     fn multiples(&self, step: f64) -> Vec<f64> {
         let first = (self.low - 1e-9).ceil();
         (0..).map(|i| first + f64::from(i) * step).take_while(|v| *v <= self.high + 1e-9).collect()
