@@ -213,7 +213,7 @@ impl<'a, G: Goal> Query<'a, G> {
         verdicts: Verdicts,
         probe: &mut P,
     ) -> bool {
-        self.decide_transparent(prims, count, verdicts, probe, |query, lane, certain, probe| {
+        self.decide_uncertain(prims, count, verdicts, probe, |query, lane, certain, probe| {
             query.take(prims[lane], &corners_of(corners, lane), certain, probe)
         })
     }
@@ -228,7 +228,7 @@ impl<'a, G: Goal> Query<'a, G> {
         verdicts: Verdicts,
         probe: &mut P,
     ) -> bool {
-        self.decide_transparent(prims, count, verdicts, probe, |query, lane, certain, probe| {
+        self.decide_uncertain(prims, count, verdicts, probe, |query, lane, certain, probe| {
             let prim = prims[lane];
             if prim == query.exclude {
                 probe.tested(|| Test { prim, t: f32::NAN, outcome: Outcome::LeftOut });
@@ -240,7 +240,7 @@ impl<'a, G: Goal> Query<'a, G> {
 
     /// Calls `take` for each lane that is not a certain miss, with a flag for certain hits, until the query is answered.
     #[inline(always)]
-    fn decide_transparent<P: Probe>(
+    fn decide_uncertain<P: Probe>(
         &mut self,
         prims: &[u32; LANES],
         count: u32,
