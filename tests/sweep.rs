@@ -224,7 +224,7 @@ fn coverage(picture: &Picture) -> f64 {
     seen as f64 / picture.beauty.len() as f64
 }
 
-/// Checks that every index of a scene is in range, and that numbers are not NaN.
+/// Checks that a scene is consistent, positions and transforms are finite, and normals and tangents unit vectors.
 fn check(loaded: &Loaded) -> Result<(), String> {
     let scene = &loaded.scene;
     scene.check().map_err(|fault| fault.to_string())?;

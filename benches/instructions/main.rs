@@ -301,7 +301,7 @@ fn paint(scene: &mut Scene) {
     });
 }
 
-/// Cuts holes into all materials, where their colour map is dark.
+/// Cuts holes into all materials, where the red channel of their base colour map is below 0.4.
 fn punch(scene: &mut Scene) {
     if let Pixels::Rgb8(numbers) = &scene.bitmaps[0].pixels {
         scene.bitmaps[0].pixels = Pixels::Rgba8(numbers.as_chunks().0.iter().map(|&[r, g, b]| [r, g, b, r]).collect());
@@ -347,8 +347,7 @@ fn counted<A: Accel>(accel: &A, rays: &[Ray], any: bool, answers: &mut Answers, 
     }
 }
 
-/// Rays at the landscape: down from one point through a grid in blocks of 4×4 if `alike`, otherwise with random origins and
-/// targets.
+/// Rays through the landscape: from a point above it through a grid in blocks of 4×4 if `alike`, otherwise between random points.
 fn rays(shapes: &Shapes, alike: bool) -> Vec<Ray> {
     let bounds = shapes.vertices.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |b, &v| (b.0.min(v), b.1.max(v)));
     let (middle, size) = ((bounds.0 + bounds.1) * 0.5, bounds.1 - bounds.0);

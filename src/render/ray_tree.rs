@@ -65,7 +65,7 @@ pub struct Query {
     pub events: Vec<Event>,
     /// Counts over all steps.
     pub counts: RayCounts,
-    /// The hit; for an occluded shadow ray, only the `prim` found first on its way.
+    /// The hit; for an occluded shadow ray only its `prim` counts, that of the first occluder found.
     pub hit: Hit,
     /// Indices of the ray's children in [`RayTree::queries`].
     pub children: Vec<usize>,

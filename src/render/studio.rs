@@ -180,7 +180,7 @@ impl Fraction {
     }
 }
 
-/// Smooth step from 0 to 1 at `x` = 0 of the given width: ½ + ½ x/√(1+x²), whose slow ends resemble those of a rough lobe.
+/// Smooth step from 0 to 1 at `x` = 0: ½ + ½ x/√(w²+x²) for the width w; its slow tails are like those of a rough lobe.
 #[inline(always)]
 fn step(x: f32, width_squared: f32) -> Fraction {
     let root = (width_squared + x * x).sqrt();

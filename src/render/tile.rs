@@ -100,7 +100,7 @@ fn render_tile<A: Accel, P: Observer>(frame: &Frame, tracer: &mut Tracer<A, P>, 
 /// A tile that was rendered by itself.
 pub(super) struct Alone<P> {
     pub pixels: TilePixels,
-    /// Processor time that the tile took.
+    /// Processor time spent; wall-clock time if no processor time was measured.
     pub spent: Duration,
     pub counts: ByClass<P>,
 }

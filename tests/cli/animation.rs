@@ -343,7 +343,7 @@ fn frames_in_which_a_scale_of_zero_hides_everything_show_what_is_behind() {
     folder.render(&["a.gltf", "--frame", "0", "--fps", "1"]).ends(3).says(&["nothing to draw"]);
 }
 
-/// A triangle that turns from red to black within a second, in front of a textured one that appears at the end of it.
+/// A triangle that fades from red to black within a second, behind a textured one that appears at its end.
 fn changing() -> String {
     let corners = [-4.0f32, -1.0, 0.0, 12.0, -1.0, 0.0, 4.0, 8.0, 0.0];
     let keys = [0.0f32, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0];

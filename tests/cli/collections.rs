@@ -4,7 +4,7 @@ use super::program::{CUBE, Folder, Run, cube_with_a_bad_face, textured_cube};
 use meshray::image::{FileKind, Metadata, Output, Picture, encode};
 use std::path::MAIN_SEPARATOR;
 
-/// Three models in two folders, and other files among them.
+/// Three models in three folders, among files that are no models.
 fn collection() -> Folder {
     let names = ["all/a.obj", "all/deep/a.obj", "all/deep/er/b.OBJ"];
     let folder = names.into_iter().fold(Folder::new(), |folder, name| folder.file(name, CUBE));

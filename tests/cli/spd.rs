@@ -10,7 +10,7 @@ const BALLS: &str = "b 0 0 0\nv\nfrom 0 0 10\nat 0 0 0\nup 0 1 0\nangle 30\nhith
 fn other_scenes_than_the_published_ones_are_told_from_them() {
     let folder = Folder::new().file("balls.nff", BALLS);
     let run = folder.run(&["bench", "--spd", ".", "--slow-tests", "2000", "--report", "spd.json", "-q"]);
-    // In both scenes every eye ray hits the floor, but the published one has 7382 objects.
+    // In both scenes every eye ray hits something; but the published scene has 7382 objects.
     let run = run.ends(1);
     for words in
         ["balls: 2 objects (7 382 published)", "same hits, bit for bit", "equal to Havran and Sixta's in 1 of 1"]
