@@ -351,7 +351,7 @@ impl Grid {
 
     /// Whether a sample is brighter than white, and far brighter than all but a few of its neighbours.
     fn is_bright(&self, x: usize, y: usize) -> bool {
-        /// No more nearly as bright samples than this: more are a wide source, which each of several pixels sees.
+        /// Most samples nearly as bright among the nine: where there are more, the source is so wide that several pixels see it.
         const FEW: usize = 3;
         let Asked { light, by_chance } = self.at(x, y);
         let rows = y.saturating_sub(1)..(y + 2).min(self.rows);

@@ -1,4 +1,4 @@
-//! Chooses which meshes are instanced, that is stored once as objects with several places, and which are flattened.
+//! Chooses which meshes are instanced, that is, stored once as objects with several places, and which are flattened.
 
 use crate::accel::instances::{Object, ObjectTransform};
 use crate::accel::{Cone, InstancedObjects};

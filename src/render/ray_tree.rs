@@ -28,7 +28,7 @@ pub enum Event {
     Transforms(usize),
 }
 
-/// Origin of a ray.
+/// Kind of a ray, by what sent it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
     /// Sent by the eye.

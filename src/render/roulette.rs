@@ -22,7 +22,7 @@ impl Roulette {
     /// of the variance allowed for its mean, however many samples that takes.
     pub(super) fn after(samples: u32, how: &Stochastic) -> Self {
         /// Fraction of the squared error, for each sample: the mean squared error of two pictures with glass grew by 1.0 % and
-        /// 1.3 %; with 2, that of three by 2.6 to 5.8 %.
+        /// 1.3 %; with a fraction of 2, that of three pictures by 2.6 to 5.8 %.
         const PART: f32 = 0.75;
         /// Upper limit, so that light far above 1 is not carried by a few branches.
         const MOST: f32 = 0.125;
@@ -56,7 +56,8 @@ impl Roulette {
     }
 }
 
-/// Whether a `value` below `least` goes on, with the probability that makes it `least` then; without a stream it does as it is.
+/// Whether `value` survives: from `least` on always; below it with probability `value` / `least`, and then scaled up to `least`,
+/// largest channels counting. Without a stream it always survives, unchanged.
 #[inline(always)]
 fn survives(value: &mut Vec3, least: f32, stream: Option<&Stream>, branch: u32, purpose: Purpose) -> bool {
     let most = value.max_element();

@@ -442,7 +442,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     /// Adds the light that points receive from a light, from the `place`th point drawn on it, or queues shadow rays; `within`
-    /// says whether these start inside of absorbing media.
+    /// says whether any of these starts inside of a medium, where media absorb light.
     fn ask_for(
         &mut self,
         traced: TracedRays,

@@ -24,7 +24,7 @@ use std::time::Duration;
 /// Columns and rows of a tile.
 pub(super) const TILE: u32 = 32;
 
-/// Columns and rows of a block of pixels, whose rays are traced one after another.
+/// Columns and rows of a block of pixels, whose rays are adjacent in their batch.
 pub(super) const BLOCK: u32 = 4;
 
 /// Most samples traced together: few enough that they and their rays stay in a core's own cache.

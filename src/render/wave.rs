@@ -57,7 +57,7 @@ pub(crate) struct Path {
 }
 
 impl Path {
-    /// The path of a eye ray inside of `media`.
+    /// The path of an eye ray inside of `media`.
     pub(crate) fn from_eye(cone_width: f32, cone_spread: f32, media: Media) -> Self {
         Self {
             weight: Vec3::ONE,

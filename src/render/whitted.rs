@@ -132,7 +132,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.firsts.resize(if layers { samples } else { 0 }, FirstSurface::NONE);
     }
 
-    /// Adds a eye ray outside of [`Self::primary_rays`].
+    /// Adds an eye ray outside of [`Self::primary_rays`].
     pub(crate) fn start(&mut self, ray: Ray, path: Path) {
         self.starting[RayClass::Primary as usize].push(ray, path, Hit::MISS);
     }
@@ -253,7 +253,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         sample.radiance += path.weight * seen;
     }
 
-    /// Adds the light that the surface at a hit emits, and queues the rays that gather the rest.
+    /// Adds the light that the surface at a hit shows without further rays, and queues the rays that gather the rest.
     pub(super) fn shade(&mut self, class: RayClass, Arrival { ray, hit, touches }: Arrival, path: &Path) {
         let context = self.context;
         let attenuated =

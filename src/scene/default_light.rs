@@ -4,7 +4,7 @@
 //! right, and nothing is lit only from behind. The studio around everything (`render::studio`) stays with the model.
 //!
 //! A file with lights of its own keeps them unchanged, without key and fill. Whether the studio surrounds them is up to the
-//! loader: glTF cannot describe surroundings, so there the studio does, lest metals be black; a scene file can.
+//! loader: glTF cannot describe surroundings, so it does there, lest metals be black; a scene file says whether it does.
 
 use super::features::is_unlit;
 use super::{Camera, Environment, Light, LightKind, Scene};

@@ -9,7 +9,7 @@ use std::f32::consts::PI;
 
 /// Lower bound of the roughness in highlights of lights without extent.
 pub(super) const NARROWEST_HIGHLIGHT: f32 = 0.045;
-/// Below this roughness they are widened so that rays hit them (see [`crate::render::glint`]).
+/// Below this roughness highlights of lights are widened so that rays hit them (see [`crate::render::glint`]).
 const NARROW_HIGHLIGHT: f32 = 0.35;
 
 /// α² of the highlights of a roughness: its fourth power.

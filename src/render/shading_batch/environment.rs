@@ -53,7 +53,8 @@ impl Default for Surroundings {
 }
 
 impl ShadingBatch {
-    /// Computes the light of `sky` and ambient light reflected by each point of a material.
+    /// Computes the light of `sky` and ambient light reflected by each point of a material; backs of one with an inside are seen
+    /// from inside.
     pub(crate) fn shade_environment(&mut self, constants: &MaterialConstants, sky: &Sky, ambient: Vec3) {
         let (bsdf, has_inside) = (&constants.bsdf, constants.has_inside());
         let (found, painted, to, points) = (&self.found, &self.painted, &mut self.surroundings, padded(self.count));

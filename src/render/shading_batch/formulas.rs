@@ -1,7 +1,7 @@
 //! Formulas of direct light: BRDF × N·L at each point of a batch.
 //!
-//! They are types rather than closures, whose methods are inlined into the loops over points in every build: only then do
-//! those loops run in lanes.
+//! They are types rather than closures: their methods are inlined into the loops over points in every build, and only then
+//! are these loops vectorised.
 
 use super::columns::{Column, POINTS};
 use super::painted::Painted;

@@ -56,8 +56,8 @@ impl Default for Lit {
 }
 
 impl ShadingBatch {
-    /// Computes the contribution of `light` at each point of a material. For an area light, `place` is the index of each
-    /// point's sample.
+    /// Computes the contribution of `light` at each point of a material; backs of one with an inside are seen from inside. For an
+    /// area light, `place` is the index of each point's sample.
     pub(crate) fn shade_light(&mut self, constants: &MaterialConstants, light: &LocalLight, place: Option<u32>) {
         let (bsdf, has_inside) = (&constants.bsdf, constants.has_inside());
         let (found, lit, points) = (&self.found, &mut self.lit, padded(self.count));

@@ -92,7 +92,7 @@ impl Surface<'_> {
 mod tests {
     use super::*;
 
-    /// Three points of the unit sphere, roughly `width` radians apart.
+    /// Three points of the unit sphere around +z, roughly `width` radians from it.
     fn cap(width: f32) -> [Vec3; 3] {
         let corner = |turn: f32| {
             let (sin, cos) = libm::sincosf(turn);

@@ -297,7 +297,7 @@ impl<'a> Sampler<'a> {
                 let count = pixel.facts.count;
                 let first = counted.max(self.known(0..count));
                 let around = u64::from(count - first);
-                // Other tiles hold the samples that are kept ahead.
+                // Samples that are kept ahead need not be traced for pixels of other tiles.
                 let beyond = if self.ahead.is_some() { 0 } else { u64::from(first - counted) };
                 done.rays_around += around;
                 done.rays_beyond += beyond;

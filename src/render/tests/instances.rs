@@ -92,7 +92,8 @@ fn a_picture_and_its_layers_are_the_same_bits_whether_or_not_instances_are_kept(
 
 #[test]
 fn what_is_known_to_stop_light_changes_no_bit() {
-    // A round mesh with some see-through faces: of kept instances it is unknown which faces, and without pruning of all.
+    // A round mesh with some see-through faces: in kept instances it is unknown which faces are opaque, and without pruning no
+    // prim is known to be.
     let mut stage = scene();
     stage.scene.materials[0].alpha_mode = AlphaMode::Blend;
     let star = &mut stage.scene.meshes[0];
