@@ -28,13 +28,13 @@ const STEP: u32 = 2;
 /// A forecast of the rendering takes one in this many columns and rows of those.
 const HINT: u32 = 4;
 const SMALL: u64 = 1 << 16;
-/// Most samples of each pixel of a smaller picture, which takes more until the search has nearly [`SMALL`] samples.
+/// Most samples that the search takes of each pixel of a smaller picture: as many as make up to [`SMALL`] in all.
 const MOST: u32 = 16;
 
 /// Additional samples of a pixel that shows something bright.
 const AGAIN: u32 = 16;
-/// A bright sample is a firefly if at most this many of [`AGAIN`] others are as bright: a pixel that shows it more often finds
-/// out by itself.
+/// A bright sample is a firefly if at most this many of [`AGAIN`] others are nearly as bright: a pixel that shows it more often
+/// finds out by itself.
 const SELDOM: usize = 2;
 
 /// A light at least this fraction as bright counts as nearly as bright.

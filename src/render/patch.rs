@@ -315,7 +315,7 @@ impl Patch<'_> {
         turned_by_texel(normal, [tangent, bitangent], texel, scale)
     }
 
-    /// Frame in which a normal map is decoded; `None` without normals, or tangents along its coordinates.
+    /// Frame in which a normal map is decoded; `None` without normals, or tangents along its coordinates, or where these vanish.
     #[inline]
     fn baked_frame(&self, map: &TextureRef) -> Option<BakedFrame> {
         let made_along = self.mesh.tangents_along;

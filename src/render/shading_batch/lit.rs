@@ -261,7 +261,7 @@ impl DirectLight<'_> {
                 |i, (incident, arrives)| arrive(lit, i, incident, arrives, in_lux),
             ),
         }
-        // The model is matched outside the loop, which is then branch-free.
+        // The model is matched outside the loops, which then need not branch on it.
         match bsdf.model {
             _ if !point_bsdfs.is_empty() => reflect_with_lobes(found, lit, point_bsdfs),
             Model::Unlit(_) => lit.seen.fill(0),

@@ -482,7 +482,7 @@ struct Turns {
     tangent: Columns,
     bitangent: Columns,
     turned: Columns,
-    /// 1 where there is a tangent.
+    /// 1 where there is a usable tangent.
     has_tangent: [u32; POINTS],
 }
 
