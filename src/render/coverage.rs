@@ -12,7 +12,7 @@ use std::ops::Range;
 /// Number of rays in the first round.
 const FIRST: u32 = 1 << 10;
 
-/// Unless more than one in this many rays of the first round hits, one ray per pixel is sent.
+/// Unless more than one in this many rays of the first round hits, and any sees something, one ray per pixel is sent.
 const RARE: usize = 100;
 
 /// Least and greatest number of rays then sent.

@@ -78,7 +78,8 @@ impl Pixel {
         self.facts.convergence == Convergence::Converged && self.facts.count == samples
     }
 
-    /// Stores the range of its first samples and its neighbours', including fireflies that it may hit.
+    /// Stores the contrast and the brightest light in `range`, that of its first samples and its neighbours', extended by the
+    /// fireflies that it may hit.
     pub(super) fn set_contrast(&mut self, judge: &Certainty, range: &Range) {
         let range = if self.firefly > 0.0 { range.with(judge.range_of(self.firefly)) } else { *range };
         (self.contrast, self.brightest) = (judge.contrast(&range), range.brightest);
