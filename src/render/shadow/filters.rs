@@ -141,7 +141,7 @@ pub struct Filters<'a>(Context<'a>);
 pub struct FilterScratch(RefCell<FilterHits>);
 
 impl<'a> Filters<'a> {
-    /// `None` where all occluders are opaque.
+    /// `None` where queries ask for opaque occluders alone: where all prims are opaque, and with [`Settings::no_prune`].
     pub fn of(scene: &'a Scene, world: &'a World, textures: &'a TextureStore<'a>, settings: &Settings) -> Option<Self> {
         let context = Context::new(scene, world, textures, settings);
         context.asks_filters().then_some(Self(context))

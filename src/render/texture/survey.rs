@@ -6,7 +6,7 @@ use crate::math::formula::floor;
 use crate::scene::{Bitmap, Filter, Mipmaps, Pixels};
 
 /// Limit of the cells of a survey along the longer side of its map: cells are doubled in size until they fit, as long as whole
-/// cells cover the map.
+/// cells cover the sides along which the map repeats.
 const CELLS: usize = 512;
 
 /// Maximum number of cells: larger maps that repeat and have a side that cannot be halved are not surveyed.
@@ -165,8 +165,8 @@ fn reach(len: usize, level: usize) -> f32 {
     BESIDE * width(level) + more.sum::<f32>()
 }
 
-/// Masks of the cells, of `side` texels a side, that contain a texel that is not clear, and one that is not solid; `None` for a
-/// channel that is constant.
+/// Masks of the cells, of `side` texels a side, that contain a texel that is not clear, and one that is not solid; `None` for the
+/// alpha of a bitmap that stores none.
 fn cells_of(
     bitmap: &Bitmap,
     channel: usize,
