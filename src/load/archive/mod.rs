@@ -47,6 +47,8 @@ pub struct Archive {
     entries: BTreeMap<String, Entry>,
     /// Bytes of memory that the archive takes.
     held: u64,
+    /// Bytes of all its files once unpacked, divided by the number of models.
+    share: u64,
 }
 
 /// A file in an archive.
@@ -184,7 +186,10 @@ impl Archive {
                 entries.insert(name, Entry::of(&record));
             }
         }
-        Ok(Self { path: path.into(), zip, entries, held: PER_BYTE * directory })
+        let unpacked = entries.values().fold(0_u64, |sum, entry: &Entry| sum.saturating_add(entry.length()));
+        let archive = Self { path: path.into(), zip, entries, held: PER_BYTE * directory, share: 0 };
+        let models = archive.models(Path::new("")).len() as u64;
+        Ok(Self { share: unpacked / models.max(1), ..archive })
     }
 
     /// Path of the archive, as the user named it.
@@ -199,8 +204,7 @@ impl Archive {
 
     /// Bytes of all its files once unpacked, divided by the number of models.
     pub fn share(&self) -> u64 {
-        let unpacked = self.entries.values().fold(0_u64, |sum, entry| sum.saturating_add(entry.length()));
-        unpacked / (self.models(Path::new("")).len() as u64).max(1)
+        self.share
     }
 
     /// Name in the archive of the file with this path, with `/` between folders; `None` if the path lies outside.
