@@ -9,13 +9,13 @@ use super::graph::Graph;
 use super::links::is_bind_matrix;
 use super::report::Report;
 use super::scene::{Draw, PosedMesh};
-use crate::math::frame::{center_of_most, spread, stride};
+use crate::math::frame::{center_of_most, spread};
 use crate::math::{DMat3, DMat4, DVec3, Vec3};
 use crate::scene::Mesh;
 use crate::scene::mesh::normal_from_object;
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
-use gltf::json::{Root, Skin as Source};
+use gltf::json::{Accessor, Index, Root, Skin as Source};
 use std::collections::HashSet;
 
 /// Pose of the meshes that use a skin.
@@ -46,19 +46,23 @@ pub(super) fn load(reader: Reader, graph: &Graph, posed: &[PosedMesh], report: &
 ///
 /// Declared bounds are not used: they may be wrong, and those of normalized integers are integers.
 fn middles(reader: Reader, posed: &[PosedMesh]) -> Vec<DVec3> {
-    let sample = |primitive: &Primitive| {
-        let index = *primitive.attributes.get(&Checked::Valid(Semantic::Positions))?;
+    /// Positions sampled of an accessor: their middle need not be exact, and a file may have very many accessors.
+    const SAMPLE: u32 = 32;
+    let sample = |index: Index<Accessor>| {
         let count = u32::try_from(reader.root.accessors.get(index.value())?.count.0).ok()?;
-        let wanted: Vec<u32> = (0..count).step_by(stride(count as usize)).collect();
+        let wanted: Vec<u32> = (0..count).step_by(count.div_ceil(SAMPLE).max(1) as usize).collect();
         // What cannot be read is reported where the mesh is.
         reader.floats::<3>(index, Pick::Only(&wanted)).ok()
     };
+    let positions = |primitive: &Primitive| primitive.attributes.get(&Checked::Valid(Semantic::Positions)).copied();
     let mut points: Vec<Vec<DVec3>> = vec![Vec::new(); reader.root.skins.len()];
+    let mut sampled = HashSet::new();
     for posed in posed {
-        let Some(of_skin) = posed.skin.and_then(|skin| points.get_mut(skin)) else { continue };
+        let Some((skin, of_skin)) = posed.skin.and_then(|skin| Some((skin, points.get_mut(skin)?))) else { continue };
         let primitives = reader.root.meshes.get(posed.mesh).into_iter().flat_map(|mesh| &mesh.primitives);
-        let sampled = primitives.filter_map(sample).flatten().map(|p| Vec3::from(p).as_dvec3());
-        of_skin.extend(sampled.filter(|p| p.is_finite()));
+        let new = primitives.filter_map(positions).filter(|index| sampled.insert((skin, index.value())));
+        let places = new.filter_map(sample).flatten().map(|p| Vec3::from(p).as_dvec3());
+        of_skin.extend(places.filter(|p| p.is_finite()));
     }
     let middle = |points: Vec<DVec3>| {
         let (lo, hi) = finite_bounds(points.iter().copied());
